@@ -1,0 +1,20 @@
+# Every library comes from the distribution's packages (tools/install-packages lists them).
+find_package(Threads REQUIRED)
+find_package(TBB CONFIG REQUIRED)  # before OpenVDB, whose own finder misses it
+find_package(Eigen3 3.4 REQUIRED NO_MODULE)
+find_package(nlohmann_json 3.11 REQUIRED)
+find_package(fmt REQUIRED)
+find_package(spdlog REQUIRED)
+find_package(CLI11 REQUIRED)
+find_package(assimp 5.2 REQUIRED)
+
+set(HDF5_PREFER_PARALLEL FALSE)
+set(HDF5_USE_STATIC_LIBRARIES ON)  # the shared one drags in some thirty libraries (tools/bundle)
+find_package(HDF5 REQUIRED COMPONENTS C)
+
+list(APPEND CMAKE_MODULE_PATH /usr/lib/${CMAKE_CXX_LIBRARY_ARCHITECTURE}/cmake/OpenVDB)
+find_package(OpenVDB 10 REQUIRED COMPONENTS openvdb)
+if(RINGLET_TESTS)
+  find_package(GTest REQUIRED)
+  find_package(benchmark REQUIRED)
+endif()

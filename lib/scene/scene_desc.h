@@ -1,0 +1,202 @@
+// A scene as plain structs: what scene::load makes of the JSON, and all that the rest of the program sees of it.
+//
+// Every value is filled in: defaults live in schemas/scene.schema.json and only there. Lengths of the scene itself
+// (translations, step lengths, tolerances) are already in metres and in the scene's axes; files are read in the units
+// and up axis given beside them. An effect that the scene does not name is an empty optional: it does not run.
+#pragma once
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/geometry.h"
+
+namespace ringlet::scene {
+
+enum class Axis { kX, kY, kZ };
+
+struct Units {
+  double metres_per_unit;  // [m] one unit of length
+  Axis up;
+};
+
+// What an asset's block overrides; empty means: what the file declares, or else the scene's.
+struct UnitsOverride {
+  std::optional<double> metres_per_unit;
+  std::optional<Axis> up;
+};
+
+struct Frames {
+  int first, last;
+  double fps;   // [1/s]
+  int preroll;  // frames from the rest pose to the first pose, before `first`
+};
+
+// ---- Motion ------------------------------------------------------------------------------------------------------
+
+enum class Interpolation { kSmooth, kLinear };  // Catmull-Rom and slerp, or linear and slerp
+
+struct Key {
+  double frame;
+  Vec3 translate;  // [m]
+  Quat rotate;
+  double scale;
+};
+
+struct Animation {
+  std::vector<Key> keys;            // sorted by frame; empty: none. Applied on top of the file's own motion.
+  Interpolation interpolation;
+  std::optional<std::string> clip;  // a clip of the file; "" is its first
+  bool loop;                        // the clip repeats; otherwise it holds at its end
+};
+
+// A mesh file. `#` characters in the file name stand for the digits of a numbered sequence (one file a frame).
+struct MeshDesc {
+  std::filesystem::path file;
+  UnitsOverride units;
+  Animation animation;
+  std::string pointer;  // JSON pointer of the block, for messages
+};
+
+// ---- Groom -------------------------------------------------------------------------------------------------------
+
+// A curve root (0) to tip (1): piecewise linear, points sorted by position, held outside. Multiplies a stiffness.
+using Curve = std::vector<std::array<double, 2>>;
+
+enum class Attach { kNearest, kStored, kFixed };
+enum class Penetration { kPushOut, kKeep, kPrune };
+
+// Selects scalp triangles of the head's rest pose: those whose centroid lies in the box (when given) and whose normal
+// is within `max_angle` of `direction` (when given), and of the mesh named `mesh` (when given).
+struct ScalpSelection {
+  std::optional<std::string> mesh;            // a mesh or object name in the head file
+  std::optional<std::array<Vec3, 2>> box;     // [m] lower and upper corner
+  std::optional<Vec3> direction;
+  double max_angle;                           // [rad]
+};
+
+// Procedural growth: physics.md section 9, supplement D of the AMS paper. Names of the paper in brackets.
+struct Grow {
+  ScalpSelection scalp;
+  int strands_per_triangle;       // [p_n]; 0: use `strands`
+  int strands;                    // total, spread over the selection by area, when strands_per_triangle is 0
+  std::int64_t seed;
+  int particles;                  // per strand, root included
+  double step;                    // [p_tau] segment length [m]
+  double length_variation;        // each strand's step is scaled by 1 + U(-1, 1) * this
+  double direction_noise;         // strength of the U(-1, 1) noise on the first direction
+  double gravity_influence;       // [p_gamma]
+  double max_deviation;           // [p_Gamma]
+  double helix_radius;            // [p_h]
+  double helix_frequency;         // [p_freq]
+  double helix_impact;            // [p_Omega]
+  double width;                   // [m] strand diameter
+};
+
+struct StiffnessScale {   // multiplies the model's stiffness along the strand
+  std::string group;      // "" : every group of this groom
+  std::string coupling;   // edge, bend, twist, integrity, angular, or all
+  Curve curve;
+};
+
+struct Groom {
+  std::string name;                           // for messages and the cache; unique in the scene
+  std::optional<std::filesystem::path> file;  // either a file
+  std::vector<std::filesystem::path> more;    // further files of the same kind, appended as groups
+  std::optional<std::filesystem::path> skin;  // .tfxskin beside a .tfx; default: same name if it exists
+  std::optional<Grow> grow;                   // or grown on the head
+  UnitsOverride units;
+  Attach attach;
+  double attach_distance;                     // [m] roots farther than this from the head are an error
+  Penetration penetration;
+  Animation animation;                        // attach fixed only
+  std::vector<StiffnessScale> stiffness;
+  double width;                               // [m] strand diameter where the file gives none
+  std::string pointer;
+};
+
+// ---- Model -------------------------------------------------------------------------------------------------------
+
+enum class ModelType { kAms };
+enum class Scheme { kProjected, kPaper };       // physics.md section 1
+enum class AngularTangent { kConsistent, kPaper };
+enum class IntegrityTangent { kExact, kPaper };
+
+struct Stiffness { double edge, bend, twist, integrity, angular; };  // per unit mass [1/s^2]
+
+struct Model {
+  ModelType type;
+  Scheme scheme;
+  Stiffness stiffness;
+  double particle_mass;            // [-] enters only forces that do not scale with mass
+  int substeps;
+  double drag;                     // [1/s] diagonal drag G / m
+  int clamped_particles;           // 1 hinged, 2 tangent clamped
+  bool preload;
+  bool geometric_stiffness;
+  double material_damping;         // beta [s]
+  AngularTangent angular_tangent;
+  IntegrityTangent integrity_tangent;
+};
+
+// ---- Effects -----------------------------------------------------------------------------------------------------
+
+enum class Cadence { kSubstep, kFrame };
+
+struct Inextensible {
+  double tolerance;     // largest edge strain left by the projection [-]
+  int max_iterations;   // Newton iterations; a strand that needs more takes more substeps
+  Cadence cadence;
+};
+
+struct Solid {
+  bool is_head;                    // "source": "head"
+  std::optional<MeshDesc> mesh;    // otherwise a mesh of its own
+  std::optional<MeshDesc> proxy;   // collides in the mesh's place
+  double friction;                 // Coulomb mu [-]
+  double offset;                   // [m] the collision surface lies this far outside the mesh
+  std::optional<double> voxel;     // [m]; otherwise from `resolution`
+  int resolution;                  // voxels on the longest axis of the mesh's bounds
+  int half_width;                  // narrow band, voxels
+  std::optional<std::filesystem::path> level_set_cache;  // directory of .vdb files keyed by content
+  std::string name;
+  std::string pointer;
+};
+
+struct Collision {                 // alternation of contact and length projections, once a substep
+  int iterations;                  // cap
+};
+
+struct Effects {
+  std::optional<Vec3> gravity;     // [m/s^2]
+  std::optional<Inextensible> inextensible;
+  std::vector<Solid> solids;
+  Collision collision;
+};
+
+struct Limits { double edge_strain; double speed; };  // [-], [m/s]: beyond them the run has diverged
+
+enum class Compression { kNone, kDefault, kQuantised };
+
+struct Cache {
+  std::vector<std::string> fields;  // position, velocity, solids
+  Compression compression;
+  double error;                     // [m] largest position error of `quantised`
+};
+
+struct Scene {
+  std::string name;
+  std::filesystem::path file;
+  Frames frames;
+  Units units;
+  std::optional<MeshDesc> head;
+  std::vector<Groom> grooms;
+  Model model;
+  Effects effects;
+  Limits limits;
+  Cache cache;
+  std::string resolved;  // the scene as JSON with --set applied and every default filled in
+  std::string hash;      // of `resolved`, hexadecimal
+};
+
+}  // namespace ringlet::scene

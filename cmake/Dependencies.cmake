@@ -10,7 +10,11 @@ find_package(assimp 5.2 REQUIRED)
 
 set(HDF5_PREFER_PARALLEL FALSE)
 set(HDF5_USE_STATIC_LIBRARIES ON)  # the shared one drags in some thirty libraries (tools/bundle)
+enable_language(C)  # FindHDF5 compiles a probe
 find_package(HDF5 REQUIRED COMPONENTS C)
+add_library(ringlet_hdf5 INTERFACE)  # the serial library with what its static archive needs, and nothing unused
+target_link_options(ringlet_hdf5 INTERFACE -Wl,--as-needed)
+target_link_libraries(ringlet_hdf5 INTERFACE HDF5::HDF5)
 
 list(APPEND CMAKE_MODULE_PATH /usr/lib/${CMAKE_CXX_LIBRARY_ARCHITECTURE}/cmake/OpenVDB)
 find_package(OpenVDB 10 REQUIRED COMPONENTS openvdb)

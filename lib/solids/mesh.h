@@ -10,29 +10,29 @@
 
 namespace ringlet::solids {
 
-// A mesh with everything that moves it: node transforms, skins, node animation, morph targets, a numbered sequence of
-// files, and the scene's own keys on top. Metres, scene axes.
+// A mesh with everything that moves it: node transforms, skins, node animation, morph targets, a numbered
+// sequence of files, and the scene's own keys on top. Metres, scene axes.
 class AnimatedMesh {
  public:
-  // Throws Error{kInput}: unreadable file, no triangles, non-finite vertices, unknown clip (the known ones are named),
-  // sequence with gaps or changing topology.
+  // Throws Error{kInput}: unreadable file, no triangles, non-finite vertices, unknown clip (the known ones
+  // are named), sequence with gaps or changing topology.
   AnimatedMesh(const scene::MeshDesc& desc, const scene::Units& scene_units, const scene::Frames& frames);
   ~AnimatedMesh();
   AnimatedMesh(AnimatedMesh&&) noexcept;
 
   std::size_t vertex_count() const;
   const std::vector<Triangle>& triangles() const;
-  const std::vector<std::int32_t>& mesh_of_triangle() const;   // index into mesh_names
+  const std::vector<std::int32_t>& mesh_of_triangle() const;  // index into mesh_names
   const std::vector<std::string>& mesh_names() const;
-  const std::vector<Vec3>& rest_vertices() const;              // node transforms at rest, no clip, no keys
+  const std::vector<Vec3>& rest_vertices() const;  // node transforms at rest, no clip, no keys
 
-  // Nothing moves; or every vertex moves by one rigid pose; or it deforms. Found by looking at the motion, not
-  // guessed from the file's features (a skin whose joints move as one is rigid).
+  // Nothing moves; or every vertex moves by one rigid pose; or it deforms. Found by looking at the motion,
+  // not guessed from the file's features (a skin whose joints move as one is rigid).
   enum class Motion { kStill, kRigid, kDeforming };
   Motion motion() const;
 
-  // Vertices at `time` [s] after frame `first`. Times before 0 are preroll: from the rest pose (at minus its length)
-  // to the pose at 0. Deterministic; safe to call from several threads at once.
+  // Vertices at `time` [s] after frame `first`. Times before 0 are preroll: from the rest pose (at minus its
+  // length) to the pose at 0. Deterministic; safe to call from several threads at once.
   void sample(double time, std::span<Vec3> out) const;
 
   // The pose that takes the rest vertices to those at `time` (motion() still or rigid only).

@@ -9,9 +9,10 @@ namespace ringlet::solids {
 
 class Solid {
  public:
-  // `mesh` is what collides (the proxy where the scene names one) and must outlive the solid. Boundary loops are found
-  // and capped (logged). A still or rigid mesh is voxelised once; a deforming one per frame, blended in time, the next
-  // frames' level sets built in a background thread. `first_time` is the run's first time [s] (preroll is negative).
+  // `mesh` is what collides (the proxy where the scene names one) and must outlive the solid. Boundary loops
+  // are found and capped (logged). A still or rigid mesh is voxelised once; a deforming one per frame,
+  // blended in time, the next frames' level sets built in a background thread. `first_time` is the run's
+  // first time [s] (preroll is negative).
   Solid(const scene::Solid& desc, const AnimatedMesh& mesh, const scene::Frames& frames, double first_time,
         const std::filesystem::path& cache_directory);
   ~Solid();
@@ -20,7 +21,8 @@ class Solid {
   const std::string& name() const;
   std::size_t bytes() const;  // of level sets and surfaces held now
 
-  // The solid over the substep [time_before, time]; both lie in one frame interval. Valid until the next call.
+  // The solid over the substep [time_before, time]; both lie in one frame interval. Valid until the next
+  // call.
   const kernels::SolidView& at(double time_before, double time);
 
  private:

@@ -1,0 +1,1 @@
+ringlet_test(solids ringlet::solids)

@@ -1,8 +1,10 @@
-// A scene as plain structs: what scene::load makes of the JSON, and all that the rest of the program sees of it.
+// A scene as plain structs: what scene::load makes of the JSON, and all that the rest of the program sees of
+// it.
 //
-// Every value is filled in: defaults live in schemas/scene.schema.json and only there. Lengths of the scene itself
-// (translations, step lengths, tolerances) are already in metres and in the scene's axes; files are read in the units
-// and up axis given beside them. An effect that the scene does not name is an empty optional: it does not run.
+// Every value is filled in: defaults live in schemas/scene.schema.json and only there. Lengths of the scene
+// itself (translations, step lengths, tolerances) are already in metres and in the scene's axes; files are
+// read in the units and up axis given beside them. An effect that the scene does not name is an empty
+// optional: it does not run.
 #pragma once
 #include <filesystem>
 #include <optional>
@@ -32,7 +34,8 @@ struct Frames {
   int preroll;  // frames from the rest pose to the first pose, before `first`
 };
 
-// ---- Motion ------------------------------------------------------------------------------------------------------
+// ---- Motion
+// ------------------------------------------------------------------------------------------------------
 
 enum class Interpolation { kSmooth, kLinear };  // Catmull-Rom and slerp, or linear and slerp
 
@@ -44,13 +47,14 @@ struct Key {
 };
 
 struct Animation {
-  std::vector<Key> keys;            // sorted by frame; empty: none. Applied on top of the file's own motion.
+  std::vector<Key> keys;  // sorted by frame; empty: none. Applied on top of the file's own motion.
   Interpolation interpolation;
   std::optional<std::string> clip;  // a clip of the file; "" is its first
   bool loop;                        // the clip repeats; otherwise it holds at its end
 };
 
-// A mesh file. `#` characters in the file name stand for the digits of a numbered sequence (one file a frame).
+// A mesh file. `#` characters in the file name stand for the digits of a numbered sequence (one file a
+// frame).
 struct MeshDesc {
   std::filesystem::path file;
   UnitsOverride units;
@@ -58,44 +62,46 @@ struct MeshDesc {
   std::string pointer;  // JSON pointer of the block, for messages
 };
 
-// ---- Groom -------------------------------------------------------------------------------------------------------
+// ---- Groom
+// -------------------------------------------------------------------------------------------------------
 
-// A curve root (0) to tip (1): piecewise linear, points sorted by position, held outside. Multiplies a stiffness.
+// A curve root (0) to tip (1): piecewise linear, points sorted by position, held outside. Multiplies a
+// stiffness.
 using Curve = std::vector<std::array<double, 2>>;
 
 enum class Attach { kNearest, kStored, kFixed };
 enum class Penetration { kPushOut, kKeep, kPrune };
 
-// Selects scalp triangles of the head's rest pose: those whose centroid lies in the box (when given) and whose normal
-// is within `max_angle` of `direction` (when given), and of the mesh named `mesh` (when given).
+// Selects scalp triangles of the head's rest pose: those whose centroid lies in the box (when given) and
+// whose normal is within `max_angle` of `direction` (when given), and of the mesh named `mesh` (when given).
 struct ScalpSelection {
-  std::optional<std::string> mesh;            // a mesh or object name in the head file
-  std::optional<std::array<Vec3, 2>> box;     // [m] lower and upper corner
+  std::optional<std::string> mesh;         // a mesh or object name in the head file
+  std::optional<std::array<Vec3, 2>> box;  // [m] lower and upper corner
   std::optional<Vec3> direction;
-  double max_angle;                           // [rad]
+  double max_angle;  // [rad]
 };
 
 // Procedural growth: physics.md section 9, supplement D of the AMS paper. Names of the paper in brackets.
 struct Grow {
   ScalpSelection scalp;
-  int strands_per_triangle;       // [p_n]; 0: use `strands`
-  int strands;                    // total, spread over the selection by area, when strands_per_triangle is 0
+  int strands_per_triangle;  // [p_n]; 0: use `strands`
+  int strands;               // total, spread over the selection by area, when strands_per_triangle is 0
   std::int64_t seed;
-  int particles;                  // per strand, root included
-  double step;                    // [p_tau] segment length [m]
-  double length_variation;        // each strand's step is scaled by 1 + U(-1, 1) * this
-  double direction_noise;         // strength of the U(-1, 1) noise on the first direction
-  double gravity_influence;       // [p_gamma]
-  double max_deviation;           // [p_Gamma]
-  double helix_radius;            // [p_h]
-  double helix_frequency;         // [p_freq]
-  double helix_impact;            // [p_Omega]
-  double width;                   // [m] strand diameter
+  int particles;             // per strand, root included
+  double step;               // [p_tau] segment length [m]
+  double length_variation;   // each strand's step is scaled by 1 + U(-1, 1) * this
+  double direction_noise;    // strength of the U(-1, 1) noise on the first direction
+  double gravity_influence;  // [p_gamma]
+  double max_deviation;      // [p_Gamma]
+  double helix_radius;       // [p_h]
+  double helix_frequency;    // [p_freq]
+  double helix_impact;       // [p_Omega]
+  double width;              // [m] strand diameter
 };
 
-struct StiffnessScale {   // multiplies the model's stiffness along the strand
-  std::string group;      // "" : every group of this groom
-  std::string coupling;   // edge, bend, twist, integrity, angular, or all
+struct StiffnessScale {  // multiplies the model's stiffness along the strand
+  std::string group;     // "" : every group of this groom
+  std::string coupling;  // edge, bend, twist, integrity, angular, or all
   Curve curve;
 };
 
@@ -107,81 +113,88 @@ struct Groom {
   std::optional<Grow> grow;                   // or grown on the head
   UnitsOverride units;
   Attach attach;
-  double attach_distance;                     // [m] roots farther than this from the head are an error
+  double attach_distance;  // [m] roots farther than this from the head are an error
   Penetration penetration;
-  Animation animation;                        // attach fixed only
+  Animation animation;  // attach fixed only
   std::vector<StiffnessScale> stiffness;
-  double width;                               // [m] strand diameter where the file gives none
+  double width;  // [m] strand diameter where the file gives none
   std::string pointer;
 };
 
-// ---- Model -------------------------------------------------------------------------------------------------------
+// ---- Model
+// -------------------------------------------------------------------------------------------------------
 
 enum class ModelType { kAms };
-enum class Scheme { kProjected, kPaper };       // physics.md section 1
+enum class Scheme { kProjected, kPaper };  // physics.md section 1
 enum class AngularTangent { kConsistent, kPaper };
 enum class IntegrityTangent { kExact, kPaper };
 
-struct Stiffness { double edge, bend, twist, integrity, angular; };  // per unit mass [1/s^2]
+struct Stiffness {
+  double edge, bend, twist, integrity, angular;
+};  // per unit mass [1/s^2]
 
 struct Model {
   ModelType type;
   Scheme scheme;
   Stiffness stiffness;
-  double particle_mass;            // [-] enters only forces that do not scale with mass
+  double particle_mass;  // [-] enters only forces that do not scale with mass
   int substeps;
-  double drag;                     // [1/s] diagonal drag G / m
-  int clamped_particles;           // 1 hinged, 2 tangent clamped
+  double drag;            // [1/s] diagonal drag G / m
+  int clamped_particles;  // 1 hinged, 2 tangent clamped
   bool preload;
   bool geometric_stiffness;
-  double material_damping;         // beta [s]
+  double material_damping;  // beta [s]
   AngularTangent angular_tangent;
   IntegrityTangent integrity_tangent;
 };
 
-// ---- Effects -----------------------------------------------------------------------------------------------------
+// ---- Effects
+// -----------------------------------------------------------------------------------------------------
 
 enum class Cadence { kSubstep, kFrame };
 
 struct Inextensible {
-  double tolerance;     // largest edge strain left by the projection [-]
-  int max_iterations;   // Newton iterations; a strand that needs more takes more substeps
+  double tolerance;    // largest edge strain left by the projection [-]
+  int max_iterations;  // Newton iterations; a strand that needs more takes more substeps
   Cadence cadence;
 };
 
 struct Solid {
-  bool is_head;                    // "source": "head"
-  std::optional<MeshDesc> mesh;    // otherwise a mesh of its own
-  std::optional<MeshDesc> proxy;   // collides in the mesh's place
-  double friction;                 // Coulomb mu [-]
-  double offset;                   // [m] the collision surface lies this far outside the mesh
-  std::optional<double> voxel;     // [m]; otherwise from `resolution`
-  int resolution;                  // voxels on the longest axis of the mesh's bounds
-  int half_width;                  // narrow band, voxels
+  bool is_head;                   // "source": "head"
+  std::optional<MeshDesc> mesh;   // otherwise a mesh of its own
+  std::optional<MeshDesc> proxy;  // collides in the mesh's place
+  double friction;                // Coulomb mu [-]
+  double offset;                  // [m] the collision surface lies this far outside the mesh
+  std::optional<double> voxel;    // [m]; otherwise from `resolution`
+  int resolution;                 // voxels on the longest axis of the mesh's bounds
+  int half_width;                 // narrow band, voxels
   std::optional<std::filesystem::path> level_set_cache;  // directory of .vdb files keyed by content
   std::string name;
   std::string pointer;
 };
 
-struct Collision {                 // alternation of contact and length projections, once a substep
-  int iterations;                  // cap
+struct Collision {  // alternation of contact and length projections, once a substep
+  int iterations;   // cap
 };
 
 struct Effects {
-  std::optional<Vec3> gravity;     // [m/s^2]
+  std::optional<Vec3> gravity;  // [m/s^2]
   std::optional<Inextensible> inextensible;
   std::vector<Solid> solids;
   Collision collision;
 };
 
-struct Limits { double edge_strain; double speed; };  // [-], [m/s]: beyond them the run has diverged
+struct Limits {
+  double edge_strain;
+  double speed;
+};  // [-], [m/s]: beyond them the run has diverged
 
 enum class Compression { kNone, kDefault, kQuantised };
 
 struct Cache {
   std::vector<std::string> fields;  // position, velocity, solids
   Compression compression;
-  double error;                     // [m] largest position error of `quantised`
+  double error;  // [m] largest position error of `quantised`
 };
 
 struct Scene {

@@ -1,0 +1,222 @@
+#include "scene/build.h"
+
+#include <numbers>
+
+#include "scene/checks.h"
+
+namespace ringlet::scene {
+namespace fs = std::filesystem;
+namespace {
+
+// The enumerator of a word. The schema names the words, a test holds the two together.
+template <class E>
+E word(const Json& value, std::initializer_list<std::pair<const char*, E>> words) {
+  for (const auto& [name, enumerator] : words)
+    if (value == name) return enumerator;
+  throw std::logic_error("scene schema: the word " + value.dump());
+}
+
+template <class T>
+std::optional<T> optional(const Json& block, const char* key) {
+  return block.contains(key) ? std::optional<T>(block[key].get<T>()) : std::nullopt;
+}
+
+Vec3 vec3(const Json& value) {
+  return Vec3(value[0].get<double>(), value[1].get<double>(), value[2].get<double>());
+}
+
+Axis axis(const Json& value) {
+  return word<Axis>(value, {{"x", Axis::kX}, {"y", Axis::kY}, {"z", Axis::kZ}});
+}
+
+class Builder {
+ public:
+  Builder(const Json& document, const fs::path& file) : document_(document), file_(file) {}
+
+  Scene scene() const {
+    const Json& effects = document_["effects"];
+    const Json& limits = document_["limits"];
+    Scene scene;
+    scene.name = document_["name"];
+    scene.file = file_;
+    scene.frames = frames();
+    scene.units = {metres(document_["units"]["length"]), axis(document_["units"]["up"])};
+    if (document_.contains("head")) scene.head = head();
+    for (const auto& [pointer, groom] : grooms_of(document_))
+      scene.grooms.push_back(make_groom(pointer, *groom));
+    scene.model = model();
+    if (effects.contains("gravity")) scene.effects.gravity = vec3(effects["gravity"]);
+    if (effects.contains("inextensible")) scene.effects.inextensible = inextensible(effects["inextensible"]);
+    for (std::size_t i = 0; i < effects["solids"].size(); ++i)
+      scene.effects.solids.push_back(solid("/effects/solids" + pointer_token(i), effects["solids"][i]));
+    scene.effects.collision = {effects["collision"]["iterations"]};
+    scene.limits = {limits["edge_strain"], limits["speed"]};
+    scene.cache = cache();
+    return scene;
+  }
+
+ private:
+  fs::path path(const Json& value) const {
+    return (file_.parent_path() / value.get<std::string>()).lexically_normal();
+  }
+
+  Frames frames() const {
+    const Json& frames = document_["frames"];
+    return {frames["first"], frames["last"], frames["fps"], frames["preroll"]};
+  }
+
+  static UnitsOverride units(const Json& block) {
+    UnitsOverride units;
+    if (!block.contains("units")) return units;
+    if (block["units"].contains("length")) units.metres_per_unit = metres(block["units"]["length"]);
+    if (block["units"].contains("up")) units.up = axis(block["units"]["up"]);
+    return units;
+  }
+
+  // Of a mesh, or of a groom, whose animation has no clip.
+  static Animation animation(const Json& block) {
+    Animation animation;
+    for (const Json& key : block["keys"]) {
+      const Json& q = key["rotate"];
+      const Quat rotate =
+          Quat(q[3].get<double>(), q[0].get<double>(), q[1].get<double>(), q[2].get<double>()).normalized();
+      animation.keys.push_back({key["frame"], vec3(key["translate"]), rotate, key["scale"]});
+    }
+    animation.interpolation = word<Interpolation>(
+        block["interpolation"], {{"smooth", Interpolation::kSmooth}, {"linear", Interpolation::kLinear}});
+    animation.clip = optional<std::string>(block, "clip");
+    animation.loop = block.contains("loop") && block["loop"].get<bool>();
+    return animation;
+  }
+
+  MeshDesc head() const {
+    const Json& head = document_["head"];
+    return {path(head["mesh"]), units(head), animation(head["animation"]), "/head"};
+  }
+
+  Groom make_groom(const std::string& pointer, const Json& block) const {
+    Groom groom;
+    groom.name = block["name"];
+    if (block.contains("file")) {
+      const Json files = block["file"].is_array() ? block["file"] : Json::array({block["file"]});
+      groom.file = path(files[0]);
+      for (std::size_t i = 1; i < files.size(); ++i) groom.more.push_back(path(files[i]));
+      groom.width = block["width"];
+    }
+    if (block.contains("skin")) groom.skin = path(block["skin"]);
+    if (block.contains("grow")) {
+      groom.grow = grow(block["grow"]);
+      groom.width = groom.grow->width;
+    }
+    groom.units = units(block);
+    groom.attach =
+        word<Attach>(block["attach"],
+                     {{"nearest", Attach::kNearest}, {"stored", Attach::kStored}, {"fixed", Attach::kFixed}});
+    groom.attach_distance = block["attach_distance"];
+    groom.penetration = word<Penetration>(
+        block["penetration"],
+        {{"push_out", Penetration::kPushOut}, {"keep", Penetration::kKeep}, {"prune", Penetration::kPrune}});
+    groom.animation = animation(block["animation"]);
+    for (const Json& scale : block["stiffness"])
+      groom.stiffness.push_back({scale["group"], scale["coupling"], scale["curve"].get<Curve>()});
+    groom.pointer = pointer;
+    return groom;
+  }
+
+  static Grow grow(const Json& block) {
+    Grow grow;
+    grow.scalp = scalp(block["scalp"]);
+    grow.strands_per_triangle = block["strands_per_triangle"];
+    grow.strands = block["strands"];
+    grow.seed = block["seed"];
+    grow.particles = block["particles"];
+    grow.step = block["step"];
+    grow.length_variation = block["length_variation"];
+    grow.direction_noise = block["direction_noise"];
+    grow.gravity_influence = block["gravity_influence"];
+    grow.max_deviation = block["max_deviation"];
+    grow.helix_radius = block["helix_radius"];
+    grow.helix_frequency = block["helix_frequency"];
+    grow.helix_impact = block["helix_impact"];
+    grow.width = block["width"];
+    return grow;
+  }
+
+  static ScalpSelection scalp(const Json& block) {
+    ScalpSelection scalp;
+    scalp.mesh = optional<std::string>(block, "mesh");
+    if (block.contains("box")) scalp.box = {vec3(block["box"][0]), vec3(block["box"][1])};
+    if (block.contains("direction")) scalp.direction = vec3(block["direction"]).normalized();
+    scalp.max_angle = block["max_angle_degrees"].get<double>() * (std::numbers::pi / 180.0);
+    return scalp;
+  }
+
+  Model model() const {
+    const Json& block = document_["model"];
+    const Json& stiffness = block["stiffness"];
+    Model model;
+    model.type = word<ModelType>(block["type"], {{"ams", ModelType::kAms}});
+    model.scheme =
+        word<Scheme>(block["scheme"], {{"projected", Scheme::kProjected}, {"paper", Scheme::kPaper}});
+    model.stiffness = {stiffness["edge"], stiffness["bend"], stiffness["twist"], stiffness["integrity"],
+                       stiffness["angular"]};
+    model.particle_mass = block["particle_mass"];
+    model.substeps = block["substeps"];
+    model.drag = block["drag"];
+    model.clamped_particles = block["clamped_particles"];
+    model.preload = block["preload"];
+    model.geometric_stiffness = block["geometric_stiffness"];
+    model.material_damping = block["material_damping"];
+    model.angular_tangent = word<AngularTangent>(
+        block["angular_tangent"],
+        {{"consistent", AngularTangent::kConsistent}, {"paper", AngularTangent::kPaper}});
+    model.integrity_tangent =
+        word<IntegrityTangent>(block["integrity_tangent"],
+                               {{"exact", IntegrityTangent::kExact}, {"paper", IntegrityTangent::kPaper}});
+    return model;
+  }
+
+  static Inextensible inextensible(const Json& block) {
+    const auto cadence =
+        word<Cadence>(block["per"], {{"substep", Cadence::kSubstep}, {"frame", Cadence::kFrame}});
+    return {block["tolerance"], block["max_iterations"], cadence};
+  }
+
+  Solid solid(const std::string& pointer, const Json& block) const {
+    Solid solid;
+    solid.is_head = block["source"] == "head";
+    const MeshDesc mesh =
+        solid.is_head ? head()
+                      : MeshDesc{path(block["source"]), units(block), animation(block["animation"]), pointer};
+    if (!solid.is_head) solid.mesh = mesh;
+    if (block.contains("proxy"))
+      solid.proxy = {path(block["proxy"]), mesh.units, mesh.animation, pointer + "/proxy"};
+    solid.friction = block["friction"];
+    solid.offset = block["offset"];
+    solid.voxel = optional<double>(block, "voxel");
+    solid.resolution = block["resolution"];
+    solid.half_width = block["half_width"];
+    if (block.contains("level_set_cache")) solid.level_set_cache = path(block["level_set_cache"]);
+    solid.name = block["name"];
+    solid.pointer = pointer;
+    return solid;
+  }
+
+  Cache cache() const {
+    const Json& block = document_["cache"];
+    const auto compression =
+        word<Compression>(block["compression"], {{"default", Compression::kDefault},
+                                                 {"none", Compression::kNone},
+                                                 {"quantised", Compression::kQuantised}});
+    return {block["fields"], compression, block["error"]};
+  }
+
+  const Json& document_;
+  const fs::path& file_;
+};
+
+}  // namespace
+
+Scene build(const Json& document, const fs::path& file) { return Builder(document, file).scene(); }
+
+}  // namespace ringlet::scene

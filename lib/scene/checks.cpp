@@ -1,0 +1,209 @@
+#include "scene/checks.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <fstream>
+#include <map>
+
+namespace ringlet::scene {
+namespace fs = std::filesystem;
+namespace {
+
+// Whether `name` is `pattern` with its run of n `#` replaced by n or more digits.
+bool in_sequence(const std::string& name, const std::string& pattern) {
+  const std::size_t first = pattern.find('#');
+  const std::size_t count = pattern.find_last_of('#') + 1 - first;
+  const std::string_view tail = std::string_view(pattern).substr(first + count);
+  if (name.size() < pattern.size() || !name.starts_with(pattern.substr(0, first)) || !name.ends_with(tail))
+    return false;
+  const std::string digits = name.substr(first, name.size() - first - tail.size());
+  return std::all_of(digits.begin(), digits.end(), [](unsigned char c) { return std::isdigit(c) != 0; });
+}
+
+// Why no frame of the sequence `pattern` can be read; empty if one can.
+std::string sequence_fault(const fs::path& pattern) {
+  const std::string name = pattern.filename().string();
+  const std::string_view run =
+      std::string_view(name).substr(name.find('#'), name.find_last_of('#') + 1 - name.find('#'));
+  if (run.find_first_not_of('#') != run.npos) return "the # of a sequence stand together";
+  const fs::path folder = pattern.has_parent_path() ? pattern.parent_path() : fs::path(".");
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
+    if (in_sequence(entry->path().filename().string(), name)) return {};
+  return "no file matches " + pattern.string();
+}
+
+// Why the file cannot be read; empty if it can.
+std::string file_fault(const fs::path& file) {
+  std::error_code error;
+  const fs::file_status status = fs::status(file, error);
+  if (status.type() == fs::file_type::not_found) return "there is no " + file.string();
+  if (fs::is_directory(status)) return file.string() + " is a folder";
+  if (error || !std::ifstream(file)) return file.string() + " cannot be opened";
+  return {};
+}
+
+bool is_zero(const Json& vector) {
+  return std::all_of(vector.begin(), vector.end(),
+                     [](const Json& x) { return std::abs(x.get<double>()) < 1e-9; });
+}
+
+class Checks {
+ public:
+  Checks(const Json& document, std::string file) : document_(document), file_(std::move(file)) {}
+
+  std::vector<Problem> run() {
+    frames();
+    if (has_head()) keys("/head/animation", document_["head"]["animation"]);
+    for (const auto& [pointer, groom] : grooms_of(document_)) check_groom(pointer, *groom);
+    const Json& solids = document_["effects"]["solids"];
+    for (std::size_t i = 0; i < solids.size(); ++i) solid("/effects/solids" + pointer_token(i), solids[i]);
+    cache();
+    unique_names();
+    return std::move(problems_);
+  }
+
+ private:
+  bool has_head() const { return document_.contains("head"); }
+
+  void add(const std::string& pointer, const std::string& found, const std::string& expected,
+           const std::string& hint = {}) {
+    problems_.push_back({file_ + "#" + pointer, "found " + found + ", expected " + expected, hint});
+  }
+
+  void frames() {
+    const int first = document_["frames"]["first"], last = document_["frames"]["last"];
+    if (last < first) add("/frames/last", brief(last), fmt::format("a frame from first, {}, on", first));
+  }
+
+  void keys(const std::string& pointer, const Json& animation) {
+    const Json& keys = animation["keys"];
+    for (std::size_t i = 0; i < keys.size(); ++i) {
+      const std::string here = pointer + "/keys" + pointer_token(i);
+      if (i > 0 && keys[i]["frame"] <= keys[i - 1]["frame"])
+        add(here + "/frame", brief(keys[i]["frame"]),
+            "a frame after the previous key's " + brief(keys[i - 1]["frame"]));
+      if (is_zero(keys[i]["rotate"]))
+        add(here + "/rotate", brief(keys[i]["rotate"]), "a quaternion that is not zero");
+    }
+  }
+
+  void check_groom(const std::string& pointer, const Json& groom) {
+    const bool file = groom.contains("file"), grow = groom.contains("grow");
+    if (file == grow) add(pointer, file ? "both file and grow" : "neither file nor grow", "one of them");
+    if (grow && !file) grown_groom(pointer, groom);
+    if (file && groom["file"].is_array() && groom["file"].size() > 1 && groom.contains("skin"))
+      add(pointer + "/skin", brief(groom["skin"]), "none with several files",
+          "each finds the one of its own name");
+    const std::string attach = groom["attach"];
+    if (!has_head() && !grow && attach != "fixed")
+      add(pointer + "/attach", brief(attach) + " without a head", "a head in the scene, or \"fixed\"");
+    if (attach != "fixed" && !groom["animation"]["keys"].empty())
+      add(pointer + "/animation", "keys", "none with attach " + brief(attach),
+          "only a fixed groom has its own motion");
+    keys(pointer + "/animation", groom["animation"]);
+    const Json& scales = groom["stiffness"];
+    for (std::size_t i = 0; i < scales.size(); ++i)
+      curve(pointer + "/stiffness" + pointer_token(i) + "/curve", scales[i]["curve"]);
+  }
+
+  void grown_groom(const std::string& pointer, const Json& groom) {
+    for (const char* key : {"skin", "units", "width"})
+      if (groom.contains(key))
+        add(pointer + pointer_token(key), brief(groom[key]), "none with grow",
+            "it belongs to a groom from a file");
+    if (!has_head()) add(pointer + "/grow", "growth without a head", "a head in the scene");
+    const Json& grow = groom["grow"];
+    const bool each = grow["strands_per_triangle"] != 0, total = grow["strands"] != 0;
+    if (each == total)
+      add(pointer + "/grow",
+          each ? "both strands and strands_per_triangle" : "neither strands nor strands_per_triangle",
+          "one of them");
+    const Json& scalp = grow["scalp"];
+    if (scalp.contains("box"))
+      for (int axis = 0; axis < 3; ++axis)
+        if (scalp["box"][0][axis] > scalp["box"][1][axis]) {
+          add(pointer + "/grow/scalp/box", brief(scalp["box"]), "the lower corner, then the upper one");
+          break;
+        }
+    if (scalp.contains("direction") && is_zero(scalp["direction"]))
+      add(pointer + "/grow/scalp/direction", brief(scalp["direction"]), "a direction that is not zero");
+  }
+
+  void curve(const std::string& pointer, const Json& curve) {
+    for (std::size_t i = 0; i < curve.size(); ++i) {
+      const double position = curve[i][0];
+      const std::string here = pointer + pointer_token(i) + "/0";
+      if (position > 1)
+        add(here, brief(curve[i][0]), "a position from 0 (root) to 1 (tip)");
+      else if (i > 0 && position <= curve[i - 1][0])
+        add(here, brief(curve[i][0]), "a position after the previous point's " + brief(curve[i - 1][0]));
+    }
+  }
+
+  void solid(const std::string& pointer, const Json& solid) {
+    if (solid["source"] != "head") return keys(pointer + "/animation", solid["animation"]);
+    if (!has_head())
+      add(pointer + "/source", "\"head\" without a head", "a head in the scene, or a mesh file");
+    for (const char* key : {"units", "animation"})
+      if (solid.contains(key))
+        add(pointer + pointer_token(key), brief(solid[key]), "none with source \"head\"",
+            fmt::format("the head's own is /head/{}", key));
+  }
+
+  void cache() {
+    const Json& fields = document_["cache"]["fields"];
+    if (std::find(fields.begin(), fields.end(), "position") == fields.end())
+      add("/cache/fields", brief(fields), "a list with \"position\"");
+  }
+
+  void unique_names() {
+    std::map<std::string, std::string> grooms, solids;  // name -> pointer of its first bearer
+    for (const auto& [pointer, groom] : grooms_of(document_)) unique_name(pointer, *groom, grooms);
+    const Json& list = document_["effects"]["solids"];
+    for (std::size_t i = 0; i < list.size(); ++i)
+      unique_name("/effects/solids" + pointer_token(i), list[i], solids);
+  }
+
+  void unique_name(const std::string& pointer, const Json& block, std::map<std::string, std::string>& names) {
+    if (!block.contains("name")) return;  // a groom of neither file nor growth
+    const auto [first, is_new] = names.emplace(block["name"], pointer);
+    if (!is_new) add(pointer + "/name", brief(block["name"]), "a name other than that of " + first->second);
+  }
+
+  const Json& document_;
+  std::string file_;
+  std::vector<Problem> problems_;
+};
+
+}  // namespace
+
+std::vector<Problem> check_files(const Schema& schema, Json& document, const fs::path& file) {
+  std::vector<Problem> problems;
+  schema.walk(document, [&](const Json& node, Json& value, const std::string& pointer) {
+    const std::string kind = node.value("path", "");
+    if ((kind != "file" && kind != "mesh") || !value.is_string() || value == "") return;
+    const fs::path path = file.parent_path() / value.get<std::string>();
+    const bool sequence = kind == "mesh" && path.filename().string().find('#') != std::string::npos;
+    const std::string fault = sequence ? sequence_fault(path) : file_fault(path);
+    if (!fault.empty())
+      problems.push_back({file.string() + "#" + pointer,
+                          "found " + brief(value) + ", expected " + schema.describe(node), fault});
+  });
+  return problems;
+}
+
+std::vector<Problem> check_meaning(const Json& document, const fs::path& file) {
+  return Checks(document, file.string()).run();
+}
+
+std::vector<std::pair<std::string, const Json*>> grooms_of(const Json& document) {
+  const Json& groom = document.at("groom");
+  if (groom.is_object()) return {{"/groom", &groom}};
+  std::vector<std::pair<std::string, const Json*>> grooms;
+  for (std::size_t i = 0; i < groom.size(); ++i) grooms.emplace_back("/groom" + pointer_token(i), &groom[i]);
+  return grooms;
+}
+
+}  // namespace ringlet::scene

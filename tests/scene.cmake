@@ -1,0 +1,1 @@
+ringlet_test(scene ringlet::scene nlohmann_json::nlohmann_json)

@@ -1,0 +1,509 @@
+// Loading scenes: values, units, defaults, overrides, the resolved text and its hash.
+#include <gmock/gmock.h>
+
+#include <fstream>
+#include <numbers>
+#include <variant>
+
+#include "scene/schema_text.h"
+#include "unit/scene_testing.h"
+
+namespace ringlet::scene {
+namespace {
+
+using SceneLoad = SceneTest;
+
+TEST_F(SceneLoad, TakesEveryValueOver) {
+  const Scene s = load_json(full());
+  EXPECT_EQ(s.name, "full");
+  EXPECT_EQ(s.file, file_);
+  EXPECT_EQ(s.frames.first, 1);
+  EXPECT_EQ(s.frames.last, 96);
+  EXPECT_EQ(s.frames.fps, 24);
+  EXPECT_EQ(s.frames.preroll, 8);
+  EXPECT_EQ(s.model.type, ModelType::kAms);
+  EXPECT_EQ(s.model.scheme, Scheme::kProjected);
+  EXPECT_EQ(s.model.stiffness.edge, 1e5);
+  EXPECT_EQ(s.model.stiffness.bend, 1e4);
+  EXPECT_EQ(s.model.stiffness.twist, 1e3);
+  EXPECT_EQ(s.model.stiffness.integrity, 10);
+  EXPECT_EQ(s.model.stiffness.angular, 20);
+  EXPECT_EQ(s.model.particle_mass, 2);
+  EXPECT_EQ(s.model.substeps, 4);
+  EXPECT_EQ(s.model.drag, 0.5);
+  EXPECT_EQ(s.model.clamped_particles, 2);
+  EXPECT_FALSE(s.model.preload);
+  EXPECT_FALSE(s.model.geometric_stiffness);
+  EXPECT_EQ(s.model.material_damping, 0.01);
+  EXPECT_EQ(s.model.angular_tangent, AngularTangent::kPaper);
+  EXPECT_EQ(s.model.integrity_tangent, IntegrityTangent::kPaper);
+  EXPECT_EQ(s.limits.edge_strain, 5);
+  EXPECT_EQ(s.limits.speed, 500);
+  EXPECT_THAT(s.cache.fields, testing::ElementsAre("position", "velocity"));
+  EXPECT_EQ(s.cache.compression, Compression::kQuantised);
+}
+
+TEST_F(SceneLoad, MakesMetresOfLengthsAndNothingElse) {
+  const Scene s = load_json(full());  // in centimetres
+  EXPECT_EQ(s.units.metres_per_unit, 0.01);
+  EXPECT_EQ(s.units.up, Axis::kZ);
+  EXPECT_EQ(s.head->units.metres_per_unit, 0.0254);
+  EXPECT_EQ(s.head->units.up, Axis::kY);
+  EXPECT_TRUE(s.head->animation.keys[0].translate.isApprox(Vec3(0.01, 0.02, 0.03), 1e-15));
+  EXPECT_EQ(s.head->animation.keys[0].scale, 2);
+  EXPECT_DOUBLE_EQ(s.grooms[0].attach_distance, 0.03);
+  EXPECT_DOUBLE_EQ(s.grooms[0].width, 1e-4);
+  EXPECT_EQ(s.grooms[0].units.metres_per_unit, 0.5);
+  EXPECT_EQ(s.grooms[0].units.up, Axis::kX);
+  EXPECT_EQ(s.grooms[1].units.metres_per_unit, std::nullopt);
+  EXPECT_EQ(s.grooms[1].units.up, std::nullopt);
+  const Grow& grow = *s.grooms[2].grow;
+  EXPECT_DOUBLE_EQ(grow.step, 0.005);
+  EXPECT_DOUBLE_EQ(grow.width, 2e-4);
+  EXPECT_TRUE((*grow.scalp.box)[0].isApprox(Vec3(0, 0.01, 0.02), 1e-15));
+  EXPECT_TRUE((*grow.scalp.box)[1].isApprox(Vec3(0.03, 0.04, 0.05), 1e-15));
+  EXPECT_EQ(*grow.scalp.direction, Vec3(0, 0, 1));
+  EXPECT_DOUBLE_EQ(grow.scalp.max_angle, std::numbers::pi / 3);
+  EXPECT_EQ(grow.helix_radius, 5);
+  EXPECT_DOUBLE_EQ(s.effects.solids[0].offset, 0.001);
+  EXPECT_DOUBLE_EQ(*s.effects.solids[0].voxel, 0.002);
+  EXPECT_EQ(*s.effects.gravity, Vec3(0, 0, -9.81));
+  EXPECT_EQ(s.limits.speed, 500);
+  EXPECT_DOUBLE_EQ(s.cache.error, 1e-5);
+}
+
+TEST_F(SceneLoad, KnowsEveryLengthUnit) {
+  const std::pair<const char*, double> units[] = {{"\"m\"", 1},       {"\"cm\"", 0.01},   {"\"mm\"", 0.001},
+                                                  {"\"in\"", 0.0254}, {"\"ft\"", 0.3048}, {"0.0027", 0.0027}};
+  for (const auto& [unit, metres] : units) {
+    const Scene s =
+        load_json(minimal(), {std::string("/units/length=") + unit, "/effects/solids/0/source=\"sphere.obj\"",
+                              "/effects/solids/0/voxel=2"});
+    EXPECT_EQ(s.units.metres_per_unit, metres);
+    EXPECT_DOUBLE_EQ(*s.effects.solids[0].voxel, 2 * metres);
+    EXPECT_DOUBLE_EQ(s.grooms[0].attach_distance, 0.02) << "defaults of lengths are metres";
+  }
+}
+
+TEST_F(SceneLoad, ReadsMotion) {
+  const Scene s = load_json(full());
+  const Animation& head = s.head->animation;
+  EXPECT_EQ(head.clip, "nod");
+  EXPECT_TRUE(head.loop);
+  EXPECT_EQ(head.interpolation, Interpolation::kLinear);
+  ASSERT_EQ(head.keys.size(), 2u);
+  EXPECT_EQ(head.keys[0].rotate.coeffs(), Quat::Identity().coeffs()) << "normalised, x y z w";
+  EXPECT_EQ(head.keys[1].rotate.coeffs(), Quat(0, 1, 0, 0).coeffs());
+  EXPECT_EQ(head.keys[1].frame, 2.5);
+  EXPECT_EQ(s.grooms[1].animation.keys.size(), 1u);
+  EXPECT_FALSE(s.grooms[1].animation.clip);
+  EXPECT_EQ(s.effects.solids[1].mesh->animation.clip, "") << "the file's first";
+  const Scene still = load_json(minimal(), {"/head/mesh=\"head.obj\""});
+  EXPECT_TRUE(still.head->animation.keys.empty());
+  EXPECT_FALSE(still.head->animation.clip);
+}
+
+TEST_F(SceneLoad, ReadsGrooms) {
+  const Scene s = load_json(full());
+  ASSERT_EQ(s.grooms.size(), 3u);
+  EXPECT_EQ(s.grooms[0].name, "a") << "the file's";
+  EXPECT_EQ(s.grooms[0].file, folder_ / "a.hair");
+  EXPECT_THAT(s.grooms[0].more, testing::ElementsAre(folder_ / "b.hair"));
+  EXPECT_EQ(s.grooms[0].attach, Attach::kNearest);
+  EXPECT_EQ(s.grooms[0].penetration, Penetration::kKeep);
+  ASSERT_EQ(s.grooms[0].stiffness.size(), 1u);
+  EXPECT_EQ(s.grooms[0].stiffness[0].group, "a");
+  EXPECT_EQ(s.grooms[0].stiffness[0].coupling, "edge");
+  EXPECT_EQ(s.grooms[0].stiffness[0].curve, (Curve{{0, 1}, {0.5, 0.25}}));
+  EXPECT_EQ(s.grooms[1].skin, folder_ / "c.tfxskin");
+  EXPECT_EQ(s.grooms[1].attach, Attach::kFixed);
+  EXPECT_EQ(s.grooms[2].name, "grown");
+  EXPECT_FALSE(s.grooms[2].file);
+  EXPECT_EQ(s.grooms[2].grow->seed, 7);
+  EXPECT_EQ(s.grooms[2].pointer, "/groom/2");
+  EXPECT_EQ(load_json(minimal()).grooms[0].pointer, "/groom");
+}
+
+TEST_F(SceneLoad, ReadsSolids) {
+  const Scene s = load_json(full());
+  const Solid& head = s.effects.solids[0];
+  EXPECT_TRUE(head.is_head);
+  EXPECT_EQ(head.name, "head");
+  EXPECT_FALSE(head.mesh);
+  EXPECT_EQ(head.proxy->file, folder_ / "proxy.obj");
+  EXPECT_EQ(head.proxy->animation.clip, "nod") << "moved as the head is";
+  EXPECT_EQ(head.proxy->units.metres_per_unit, 0.0254) << "in the head's units";
+  EXPECT_EQ(head.friction, 0.3);
+  EXPECT_EQ(head.resolution, 64);
+  EXPECT_EQ(head.half_width, 4);
+  EXPECT_EQ(head.level_set_cache, folder_ / "levels");
+  const Solid& ball = s.effects.solids[1];
+  EXPECT_FALSE(ball.is_head);
+  EXPECT_EQ(ball.name, "ball");
+  EXPECT_EQ(ball.mesh->file, folder_ / "sphere.obj");
+  EXPECT_EQ(ball.mesh->units.metres_per_unit, 0.3048);
+  EXPECT_EQ(ball.pointer, "/effects/solids/1");
+  EXPECT_EQ(s.effects.collision.iterations, 6);
+  const Scene own = load_json(minimal(), {"/effects/solids/0={\"source\": \"./head\"}"});
+  EXPECT_FALSE(own.effects.solids[0].is_head) << "a file called head";
+}
+
+TEST_F(SceneLoad, RunsNoEffectThatIsAbsent) {
+  const Scene s = load_json(minimal());
+  EXPECT_FALSE(s.effects.gravity);
+  EXPECT_FALSE(s.effects.inextensible);
+  EXPECT_TRUE(s.effects.solids.empty());
+  EXPECT_FALSE(s.head);
+}
+
+TEST_F(SceneLoad, FindsTheFilesOfASequence) {
+  const Scene s = load_json(minimal(), {"/head/mesh=\"sequence/face.####.obj\""});
+  EXPECT_EQ(s.head->file, folder_ / "sequence/face.####.obj");
+  load_json(minimal(), {"/head/mesh=\"sequence/face.#.obj\""});
+}
+
+// ---- Defaults
+// ----------------------------------------------------------------------------------------------------
+
+// Pointers of all scalar defaults (and of numbers and words in lists) in the schema.
+void collect_defaults(const Json& node, const std::string& pointer, std::set<std::string>& found) {
+  if (!node.is_structured()) return;
+  for (const auto& [key, inner] : node.items()) {
+    const std::string here = pointer + "/" + key;
+    const bool is_default = key == "default" && node.is_object();
+    if (is_default && !(inner.is_structured() && inner.empty()))
+      found.insert(here);
+    else
+      collect_defaults(inner, here, found);
+  }
+}
+
+struct DefaultCase {
+  std::string in_schema;    // pointer, without its /default
+  std::string in_resolved;  // pointer
+  Json in_struct;
+};
+
+TEST_F(SceneLoad, FillsInExactlyTheSchemasDefaults) {
+  const Scene s = load_json(Json::parse(R"({
+    "name": "defaults", "frames": {"last": 2},
+    "head": {"mesh": "head.obj", "animation": {"keys": [{"frame": 1}]}},
+    "groom": [{"file": "a.hair", "stiffness": [{"curve": [[0, 1]]}]}, {"grow": {"strands_per_triangle": 1}},
+              {"file": "b.hair", "attach": "fixed"}, {"name": "few", "grow": {"strands": 5}}],
+    "effects": {"inextensible": {}, "solids": [{"source": "head"}]}})"));
+  const Key& key = s.head->animation.keys[0];
+  const Groom& groom = s.grooms[0];
+  const Grow& grow = *s.grooms[1].grow;
+  const Solid& solid = s.effects.solids[0];
+  const auto is = [](auto value, auto expected) { return value == expected; };
+  const auto word = [](bool right, const char* name) { return right ? Json(name) : Json("another word"); };
+  const std::string props = "/properties/", defs = "/definitions/";
+  const std::vector<DefaultCase> cases = {
+      {props + "frames/properties/first", "/frames/first", s.frames.first},
+      {props + "frames/properties/fps", "/frames/fps", s.frames.fps},
+      {props + "frames/properties/preroll", "/frames/preroll", s.frames.preroll},
+      {props + "units/properties/length", "/units/length", word(is(s.units.metres_per_unit, 1.0), "m")},
+      {props + "units/properties/up", "/units/up", word(is(s.units.up, Axis::kY), "y")},
+      {props + "effects/properties/collision/properties/iterations", "/effects/collision/iterations",
+       s.effects.collision.iterations},
+      {props + "limits/properties/edge_strain", "/limits/edge_strain", s.limits.edge_strain},
+      {props + "limits/properties/speed", "/limits/speed", s.limits.speed},
+      {props + "cache/properties/fields", "/cache/fields", s.cache.fields},
+      {props + "cache/properties/compression", "/cache/compression",
+       word(is(s.cache.compression, Compression::kDefault), "default")},
+      {props + "cache/properties/error", "/cache/error", s.cache.error},
+      {defs + "key/properties/translate",
+       "/head/animation/keys/0/translate",
+       {key.translate.x(), key.translate.y(), key.translate.z()}},
+      {defs + "key/properties/rotate",
+       "/head/animation/keys/0/rotate",
+       {key.rotate.x(), key.rotate.y(), key.rotate.z(), key.rotate.w()}},
+      {defs + "key/properties/scale", "/head/animation/keys/0/scale", key.scale},
+      {defs + "mesh_animation/properties/loop", "/head/animation/loop", s.head->animation.loop},
+      {defs + "mesh_animation/properties/interpolation", "/head/animation/interpolation",
+       word(is(s.head->animation.interpolation, Interpolation::kSmooth), "smooth")},
+      {defs + "groom_animation/properties/interpolation", "/groom/0/animation/interpolation",
+       word(is(groom.animation.interpolation, Interpolation::kSmooth), "smooth")},
+      {defs + "groom/properties/attach", "/groom/0/attach",
+       word(is(groom.attach, Attach::kNearest), "nearest")},
+      {defs + "groom/properties/attach_distance", "/groom/0/attach_distance", groom.attach_distance},
+      {defs + "groom/properties/penetration", "/groom/0/penetration",
+       word(is(groom.penetration, Penetration::kPushOut), "push_out")},
+      {defs + "groom/then/properties/name", "/groom/1/name", s.grooms[1].name},
+      {defs + "groom/else/properties/width", "/groom/0/width", groom.width},
+      {defs + "stiffness_scale/properties/group", "/groom/0/stiffness/0/group", groom.stiffness[0].group},
+      {defs + "stiffness_scale/properties/coupling", "/groom/0/stiffness/0/coupling",
+       groom.stiffness[0].coupling},
+      {defs + "grow/properties/scalp/properties/max_angle_degrees", "/groom/1/grow/scalp/max_angle_degrees",
+       grow.scalp.max_angle * 180 / std::numbers::pi},
+      {defs + "grow/properties/strands_per_triangle", "/groom/3/grow/strands_per_triangle",
+       s.grooms[3].grow->strands_per_triangle},
+      {defs + "grow/properties/strands", "/groom/1/grow/strands", grow.strands},
+      {defs + "grow/properties/seed", "/groom/1/grow/seed", grow.seed},
+      {defs + "grow/properties/particles", "/groom/1/grow/particles", grow.particles},
+      {defs + "grow/properties/step", "/groom/1/grow/step", grow.step},
+      {defs + "grow/properties/length_variation", "/groom/1/grow/length_variation", grow.length_variation},
+      {defs + "grow/properties/direction_noise", "/groom/1/grow/direction_noise", grow.direction_noise},
+      {defs + "grow/properties/gravity_influence", "/groom/1/grow/gravity_influence", grow.gravity_influence},
+      {defs + "grow/properties/max_deviation", "/groom/1/grow/max_deviation", grow.max_deviation},
+      {defs + "grow/properties/helix_radius", "/groom/1/grow/helix_radius", grow.helix_radius},
+      {defs + "grow/properties/helix_frequency", "/groom/1/grow/helix_frequency", grow.helix_frequency},
+      {defs + "grow/properties/helix_impact", "/groom/1/grow/helix_impact", grow.helix_impact},
+      {defs + "grow/properties/width", "/groom/1/grow/width", grow.width},
+      {defs + "model/properties/type", "/model/type", word(is(s.model.type, ModelType::kAms), "ams")},
+      {defs + "model/properties/scheme", "/model/scheme",
+       word(is(s.model.scheme, Scheme::kProjected), "projected")},
+      {defs + "model/properties/stiffness/properties/edge", "/model/stiffness/edge", s.model.stiffness.edge},
+      {defs + "model/properties/stiffness/properties/bend", "/model/stiffness/bend", s.model.stiffness.bend},
+      {defs + "model/properties/stiffness/properties/twist", "/model/stiffness/twist",
+       s.model.stiffness.twist},
+      {defs + "model/properties/stiffness/properties/integrity", "/model/stiffness/integrity",
+       s.model.stiffness.integrity},
+      {defs + "model/properties/stiffness/properties/angular", "/model/stiffness/angular",
+       s.model.stiffness.angular},
+      {defs + "model/properties/particle_mass", "/model/particle_mass", s.model.particle_mass},
+      {defs + "model/properties/substeps", "/model/substeps", s.model.substeps},
+      {defs + "model/properties/drag", "/model/drag", s.model.drag},
+      {defs + "model/properties/clamped_particles", "/model/clamped_particles", s.model.clamped_particles},
+      {defs + "model/properties/preload", "/model/preload", s.model.preload},
+      {defs + "model/else/properties/geometric_stiffness", "/model/geometric_stiffness",
+       s.model.geometric_stiffness},
+      {defs + "model/else/properties/material_damping", "/model/material_damping", s.model.material_damping},
+      {defs + "model/else/properties/angular_tangent", "/model/angular_tangent",
+       word(is(s.model.angular_tangent, AngularTangent::kConsistent), "consistent")},
+      {defs + "model/else/properties/integrity_tangent", "/model/integrity_tangent",
+       word(is(s.model.integrity_tangent, IntegrityTangent::kExact), "exact")},
+      {defs + "inextensible/properties/tolerance", "/effects/inextensible/tolerance",
+       s.effects.inextensible->tolerance},
+      {defs + "inextensible/properties/max_iterations", "/effects/inextensible/max_iterations",
+       s.effects.inextensible->max_iterations},
+      {defs + "inextensible/properties/per", "/effects/inextensible/per",
+       word(is(s.effects.inextensible->cadence, Cadence::kSubstep), "substep")},
+      {defs + "solid/properties/friction", "/effects/solids/0/friction", solid.friction},
+      {defs + "solid/properties/offset", "/effects/solids/0/offset", solid.offset},
+      {defs + "solid/properties/resolution", "/effects/solids/0/resolution", solid.resolution},
+      {defs + "solid/properties/half_width", "/effects/solids/0/half_width", solid.half_width},
+  };
+  const Json schema = Json::parse(schema_text());
+  const Json resolved = Json::parse(s.resolved);
+  std::set<std::string> in_schema, tested;
+  collect_defaults(schema, "", in_schema);
+  for (const DefaultCase& c : cases) {
+    const Json& value = schema[Json::json_pointer(c.in_schema + "/default")];
+    EXPECT_EQ(resolved.at(Json::json_pointer(c.in_resolved)), value) << c.in_schema;
+    EXPECT_EQ(c.in_struct, value) << c.in_schema;
+    tested.insert(c.in_schema + "/default");
+  }
+  for (const char* name : {"geometric_stiffness", "material_damping", "angular_tangent", "integrity_tangent"})
+    tested.insert(defs + "model/then/properties/" + name + "/default");  // below
+  EXPECT_EQ(tested, in_schema) << "a default without a test, or a test without a default";
+}
+
+TEST_F(SceneLoad, TakesThePapersVariantsFromItsScheme) {
+  const Json variants = Json::parse(schema_text())["definitions"]["model"]["then"]["properties"];
+  const Scene paper = load_json(minimal(), {"/model/scheme=\"paper\""});
+  const Json resolved = Json::parse(paper.resolved)["model"];
+  EXPECT_EQ(resolved["geometric_stiffness"], variants["geometric_stiffness"]["default"]);
+  EXPECT_EQ(resolved["material_damping"], variants["material_damping"]["default"]);
+  EXPECT_EQ(resolved["angular_tangent"], variants["angular_tangent"]["default"]);
+  EXPECT_EQ(resolved["integrity_tangent"], variants["integrity_tangent"]["default"]);
+  EXPECT_EQ(paper.model.scheme, Scheme::kPaper);
+  EXPECT_FALSE(paper.model.geometric_stiffness);
+  EXPECT_EQ(paper.model.material_damping, 0);
+  EXPECT_EQ(paper.model.angular_tangent, AngularTangent::kPaper);
+  EXPECT_EQ(paper.model.integrity_tangent, IntegrityTangent::kPaper);
+  EXPECT_TRUE(paper.model.preload) << "stays on";
+
+  const Scene own = load_json(minimal(), {"/model/scheme=\"paper\"", "/model/material_damping=0.01",
+                                          "/model/integrity_tangent=\"exact\""});
+  EXPECT_EQ(own.model.material_damping, 0.01) << "what the scene says wins";
+  EXPECT_EQ(own.model.integrity_tangent, IntegrityTangent::kExact);
+  EXPECT_FALSE(own.model.geometric_stiffness);
+}
+
+// ---- Overrides
+// ---------------------------------------------------------------------------------------------------
+
+TEST_F(SceneLoad, AppliesOverridesInOrder) {
+  const Scene s =
+      load_json(full(), {"/frames/last=10", "/frames/last=12", "/effects/gravity=null",
+                         "/effects/solids/1=null", "/effects/solids/-={\"source\": \"sphere.obj\"}",
+                         "/effects/solids/1/friction=0.9", "/cache=null", "/effects/no/such/thing=null",
+                         "/effects/solids/7=null", "/name=\"a=b\"", "/name=\"wedge\""});
+  EXPECT_EQ(s.frames.last, 12);
+  EXPECT_FALSE(s.effects.gravity);
+  ASSERT_EQ(s.effects.solids.size(), 2u);
+  EXPECT_EQ(s.effects.solids[1].name, "sphere");
+  EXPECT_EQ(s.effects.solids[1].friction, 0.9);
+  EXPECT_THAT(s.cache.fields, testing::ElementsAre("position"));
+  EXPECT_EQ(s.name, "wedge");
+  const Scene made = load_json(
+      minimal(), {"/effects/inextensible/tolerance=1e-3", "/effects/solids/-/source=\"sphere.obj\""});
+  EXPECT_EQ(made.effects.inextensible->tolerance, 1e-3) << "missing parents are made";
+  EXPECT_EQ(made.effects.solids.size(), 1u);
+}
+
+TEST_F(SceneLoad, RefusesMalformedOverrides) {
+  const auto error = [&](const char* text) {
+    return error_of_text(minimal().dump(), {text}, ErrorKind::kUsage);
+  };
+  EXPECT_EQ(error("/frames/last"),
+            "--set /frames/last: expected POINTER=JSON (for instance /frames/last=48)");
+  EXPECT_EQ(error("frames=1"),
+            "--set frames=1: a JSON pointer begins with '/' (for instance /frames/last=48)");
+  EXPECT_EQ(error("=1"), "--set =1: a JSON pointer begins with '/' (for instance /frames/last=48)");
+  EXPECT_EQ(error("/a~2=1"), "--set /a~2=1: '~' in a JSON pointer is written ~0");
+  EXPECT_EQ(error("/a~=1"), "--set /a~=1: '~' in a JSON pointer is written ~0");
+  EXPECT_THAT(error("/name=wedge"),
+              testing::AllOf(testing::StartsWith("--set /name=wedge: the value is not JSON: "),
+                             testing::EndsWith("(text needs its double quotes: /name=\"wedge\")")));
+  EXPECT_THAT(error("/name="), testing::StartsWith("--set /name=: the value is not JSON: "));
+  EXPECT_THAT(error("/limits/speed=1e999"), testing::HasSubstr("number overflow parsing '1e999'"));
+  EXPECT_EQ(error("/name/first=1"),
+            "--set /name/first=1: 'first' is no member of \"tiny\", which is no object or list");
+  EXPECT_EQ(error_of_text(full().dump(), {"/groom/4/name=\"x\""}, ErrorKind::kUsage),
+            "--set /groom/4/name=\"x\": '4' is no index of a list of 3 (0 to 3, or - to append)");
+  EXPECT_EQ(error_of_text(full().dump(), {"/groom/01/name=\"x\""}, ErrorKind::kUsage),
+            "--set /groom/01/name=\"x\": '01' is no index of a list of 3 (0 to 3, or - to append)");
+}
+
+TEST_F(SceneLoad, SaysThatAnOverrideIsToBlame) {
+  EXPECT_EQ(error_of(minimal(), {"/frames={\"last\": 0}", "/limits/sped=1"}),
+            "scene#/limits/sped: found an unknown key, expected one of edge_strain, speed (did you mean "
+            "speed?; given "
+            "by --set)");
+  EXPECT_EQ(error_of(minimal(), {"/frames={\"last\": 0}"}),
+            "scene#/frames/last: found 0, expected a frame from first, 1, on (given by --set)");
+}
+
+// ---- Resolved text and hash
+// ---------------------------------------------------------------------------------------
+
+TEST_F(SceneLoad, ResolvesToASceneThatResolvesToItself) {
+  for (const Json& json : {minimal(), full()}) {
+    const Scene s = load_json(json);
+    const Scene again = load_text(s.resolved);
+    EXPECT_EQ(again.resolved, s.resolved);
+    EXPECT_EQ(again.hash, s.hash);
+  }
+}
+
+TEST_F(SceneLoad, KeepsWhatTheUserWroteInTheResolvedScene) {
+  const Json resolved = Json::parse(load_json(full()).resolved);
+  EXPECT_FALSE(resolved.contains("$schema"));
+  const Json flat_resolved = resolved.flatten(), written = full().flatten();
+  for (const auto& [pointer, value] : written.items())
+    if (pointer != "/$schema" && !value.is_null()) {  // flatten makes null of an empty list
+      EXPECT_EQ(flat_resolved[pointer], value) << pointer;
+    }
+}
+
+TEST_F(SceneLoad, GivesDefaultLengthsInTheScenesUnit) {
+  const Json resolved = Json::parse(load_json(minimal(), {"/units/length=\"cm\""}).resolved);
+  EXPECT_EQ(resolved["groom"]["attach_distance"], 2.0);
+  EXPECT_EQ(resolved["groom"]["width"], 0.008);
+  EXPECT_EQ(resolved["cache"]["error"], 0.001);
+}
+
+TEST_F(SceneLoad, HashesWhatTheSceneMeans) {
+  const std::string hash =
+      load_text(
+          R"({"name": "a", "frames": {"first": 1, "last": 2}, "groom": {"file": "a.hair", "attach": "fixed"}})")
+          .hash;
+  EXPECT_THAT(hash, testing::MatchesRegex("[0-9a-f]{16}"));
+  EXPECT_EQ(hash, load_text(R"({
+    "$schema": "elsewhere.json",
+    "groom": {"attach": "fixed", "file": "a.hair"},
+    "frames": {"last": 2, "first": 1, "fps": 24.0},
+    "model": {"drag": 0},
+    "name": "a"
+  })")
+                      .hash)
+      << "order, white space, defaults written out, 24 or 24.0";
+  EXPECT_NE(
+      hash,
+      load_text(
+          R"({"name": "a", "frames": {"first": 1, "last": 3}, "groom": {"file": "a.hair", "attach": "fixed"}})")
+          .hash);
+}
+
+TEST_F(SceneLoad, HashIsFnv1aOfTheResolvedText) {
+  const Scene s = load_json(minimal());
+  unsigned __int128 hash = 14695981039346656037u;  // the published offset basis and prime
+  for (const unsigned char c : s.resolved) hash = ((hash ^ c) * 1099511628211u) & ~std::uint64_t{0};
+  EXPECT_EQ(std::stoull(s.hash, nullptr, 16), static_cast<std::uint64_t>(hash));
+}
+
+// ---- The schema itself
+// -------------------------------------------------------------------------------------------
+
+// Calls visit(node, pointer) for each schema that describes a value (not those of if/then/else's conditions).
+template <class Visit>
+void each_value_schema(const Json& node, const std::string& pointer, const Visit& visit) {
+  if (!node.is_object()) return;
+  visit(node, pointer);
+  if (node.contains("properties"))
+    for (const auto& [key, inner] : node["properties"].items())
+      each_value_schema(inner, pointer + "/properties/" + key, visit);
+  if (node.contains("items")) each_value_schema(node["items"], pointer + "/items", visit);
+  if (node.contains("definitions"))
+    for (const auto& [key, inner] : node["definitions"].items())
+      each_value_schema(inner, pointer + "/definitions/" + key, visit);
+  if (node.contains("properties") || !node.contains("if")) return;
+  for (const char* branch : {"then", "else"})
+    if (node.contains(branch)) each_value_schema(node[branch], pointer + "/" + branch, visit);
+}
+
+TEST(SceneSchema, IsTheOneInTheRepository) {
+  std::ifstream stream(RINGLET_SOURCE_DIR "/schemas/scene.schema.json");
+  EXPECT_EQ(std::string(std::istreambuf_iterator<char>(stream), {}), schema_text());
+}
+
+TEST(SceneSchema, IsClosedDescribedAndHasUnits) {
+  each_value_schema(Json::parse(schema_text()), "", [](const Json& node, const std::string& pointer) {
+    const std::string type = node.value("type", "");
+    if (type == "number") {
+      EXPECT_TRUE(node.contains("unit")) << pointer;
+    }
+    if (type == "integer") {
+      EXPECT_TRUE(node.contains("minimum") && node.contains("maximum")) << pointer;
+    }
+    if (type == "array") {
+      EXPECT_TRUE(node["items"].is_object()) << pointer;
+    }
+    if (type != "object") return;
+    EXPECT_EQ(node.value("additionalProperties", true), false) << pointer;
+    for (const auto& [key, inner] : node["properties"].items()) {
+      EXPECT_TRUE(inner.contains("description") || inner.contains("$ref"))
+          << pointer << "/properties/" << key;
+    }
+  });
+}
+
+TEST_F(SceneLoad, KnowsEveryWordOfTheSchema) {
+  const Json schema = Json::parse(schema_text());
+  const std::tuple<const char*, const char*> words[] = {
+      {"/definitions/axis/enum", "/units/up"},
+      {"/definitions/length_unit/then/enum", "/units/length"},
+      {"/definitions/interpolation/enum", "/head/animation/interpolation"},
+      {"/definitions/groom/properties/attach/enum", "/groom/0/attach"},
+      {"/definitions/groom/properties/penetration/enum", "/groom/0/penetration"},
+      {"/definitions/stiffness_scale/properties/coupling/enum", "/groom/0/stiffness/0/coupling"},
+      {"/definitions/model/properties/type/enum", "/model/type"},
+      {"/definitions/model/properties/scheme/enum", "/model/scheme"},
+      {"/definitions/model/properties/angular_tangent/enum", "/model/angular_tangent"},
+      {"/definitions/model/properties/integrity_tangent/enum", "/model/integrity_tangent"},
+      {"/definitions/inextensible/properties/per/enum", "/effects/inextensible/per"},
+      {"/properties/cache/properties/compression/enum", "/cache/compression"},
+  };
+  for (const auto& [in_schema, in_scene] : words)
+    for (const Json& word : schema.at(Json::json_pointer(in_schema)))
+      EXPECT_NO_THROW(load_json(full(), {std::string(in_scene) + "=" + word.dump()})) << in_scene << word;
+  std::size_t enums = 0;
+  each_value_schema(schema, "",
+                    [&](const Json& node, const std::string&) { enums += node.contains("enum"); });
+  EXPECT_EQ(enums, std::size(words) + 1) << "all but cache.fields, which stay words";
+}
+
+}  // namespace
+}  // namespace ringlet::scene

@@ -1,0 +1,1 @@
+ringlet_test(cache ringlet::cache ringlet_hdf5)

@@ -12,12 +12,13 @@ namespace ringlet::groom {
 struct Scalp {
   std::span<const Vec3> vertices;
   std::span<const Triangle> triangles;
-  std::span<const std::int32_t> mesh_of_triangle;    // index into mesh_names
+  std::span<const std::int32_t> mesh_of_triangle;  // index into mesh_names
   std::span<const std::string> mesh_names;
 };
 
-// Reads .hair (Cem Yuksel), .data (USC-HairSalon), .tfx with .tfxskin (TressFX 3 and 4) or Ringlet's .h5 groom by the
-// file's content. Lengths become metres and axes the scene's. Throws Error{kInput} with file and byte offset.
+// Reads .hair (Cem Yuksel), .data (USC-HairSalon), .tfx with .tfxskin (TressFX 3 and 4) or Ringlet's .h5
+// groom by the file's content. Lengths become metres and axes the scene's. Throws Error{kInput} with file and
+// byte offset.
 Strands read(const std::filesystem::path& file, const std::optional<std::filesystem::path>& skin,
              const scene::UnitsOverride& units, const scene::Units& scene_units);
 
@@ -33,21 +34,24 @@ void write(const std::filesystem::path& file, const Strands& strands, scene::Axi
 // Strands held by the head: each root at its triangle and barycentrics, its frame turned by that triangle.
 class Attachment {
  public:
-  // Nearest triangle for each root, or the stored one. Throws Error{kInput} naming strand and distance where a root is
-  // farther than `desc.attach_distance` from the head, or a stored triangle does not exist.
+  // Nearest triangle for each root (never one without area; the lowest index of equals), or the stored one.
+  // Stored coordinates that do not lie at the root give way to the stored triangle's nearest point. Throws
+  // Error{kInput} naming strand and distance where a root is farther than `desc.attach_distance` from the
+  // head, or a stored triangle does not exist.
   static Attachment to_head(const Strands& strands, const Scalp& rest, const scene::Groom& desc);
 
   const std::vector<RootSite>& sites() const { return sites_; }
 
-  // Root poses for the head's vertices now: rotation from the rest pose's triangle frame to now's (exactly identity
-  // for unmoved vertices), position of the strand's first particle. `out` holds one pose per strand.
+  // Root poses for the head's vertices now: rotation from the rest pose's triangle frame to now's (exactly
+  // identity for unmoved vertices), position of the strand's first particle. `out` holds one pose per strand.
   void pose(std::span<const Vec3> vertices, std::span<Pose> out) const;
 
  private:
   std::vector<RootSite> sites_;
-  std::vector<Triangle> triangles_;     // vertex indices of each site's triangle
-  std::vector<Mat3> rest_frame_;        // of each site's triangle in the rest pose
-  std::vector<Vec3> offset_;            // root minus its point on the triangle, rest pose
+  std::vector<Triangle> triangles_;  // vertex indices of each site's triangle
+  std::vector<Mat3> rest_frame_;     // of each site's triangle in the rest pose
+  std::vector<Vec3> rest_point_;     // each site's point on the head, rest pose
+  std::vector<Vec3> rest_root_;      // each strand's first particle, rest pose
 };
 
 }  // namespace ringlet::groom

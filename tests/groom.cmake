@@ -1,0 +1,1 @@
+ringlet_test(groom ringlet::groom ringlet_hdf5 TBB::tbb)

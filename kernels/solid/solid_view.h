@@ -1,38 +1,42 @@
-// A solid as the kernels see it for one substep: narrow-band level sets, a rigid pose, and the surface triangles for
-// exact normals and velocities. Plain pointers; whoever fills it owns the memory for the substep.
+// A solid as the kernels see it for one substep: narrow-band level sets, a rigid pose, and the surface
+// triangles for exact normals and velocities. Plain pointers; whoever fills it owns the memory for the
+// substep.
 #pragma once
 #include <cstdint>
 
 namespace ringlet::kernels {
 
-// Sparse narrow band in tiles of 8^3 voxels, the leaf nodes of an OpenVDB grid. Voxel (i, j, k) has its sample at
-// voxel_size * (i, j, k) in level-set coordinates. Distances [m], negative inside.
+// Sparse narrow band in tiles of 8^3 voxels, the leaf nodes of an OpenVDB grid. Voxel (i, j, k) has its
+// sample at voxel_size * (i, j, k) in level-set coordinates. Distances [m], negative inside.
 struct LevelSetView {
-  float voxel_size;                 // [m]
-  float background;                 // [m] half width of the band: the distance stored beyond it
-  std::int32_t tile_min[3];         // lowest tile coordinate, in tiles
+  float voxel_size;          // [m]
+  float background;          // [m] half width of the band: the distance stored beyond it
+  std::int32_t tile_min[3];  // lowest tile coordinate, in tiles
   std::int32_t tile_count[3];
-  const std::int32_t* tile;         // [x][y][z]: tile number, or kTileOutside / kTileInside
-  const float* distance;            // [tiles][512], voxel (x & 7) << 6 | (y & 7) << 3 | (z & 7)
-  const std::int32_t* triangle;     // [tiles][512] closest triangle, -1 where unknown
+  const std::int32_t* tile;      // [x][y][z]: tile number, or kTileOutside / kTileInside
+  const float* distance;         // [tiles][512], voxel (x & 7) << 6 | (y & 7) << 3 | (z & 7)
+  const std::int32_t* triangle;  // [tiles][512] closest triangle, -1 where unknown
 };
 inline constexpr std::int32_t kTileOutside = -1;
 inline constexpr std::int32_t kTileInside = -2;
 
 struct SolidView {
-  LevelSetView level_set[2];        // at the frame before and the frame after; the same for a rigid solid
-  float blend;                      // weight of level_set[1]; 0 for a rigid solid
-  float friction;                   // Coulomb mu [-]
-  float offset;                     // [m] the collision surface lies this far outside the level set
+  LevelSetView level_set[2];  // at the frame before and the frame after; the same for a rigid solid
+  float blend;                // weight of level_set[1]; 0 for a rigid solid
+  float friction;             // Coulomb mu [-]
+  float offset;               // [m] the collision surface lies this far outside the level set
 
-  // World from level-set coordinates, x = rotation * p + translation, at the substep's start and end. Row-major, [m].
+  // World from level-set coordinates, x = rotation * p + translation, at the substep's start and end.
+  // Row-major, [m].
   double rotation_before[9], translation_before[3];
   double rotation[9], translation[3];
 
-  // The surface (caps included) in level-set coordinates at the substep's start and end; the same for a rigid solid.
-  const std::int32_t* triangles;    // [triangles][3]
-  const float* vertices_before;     // [vertices][3] [m]
-  const float* vertices;            // [vertices][3] [m]
+  // The surface (caps included) in level-set coordinates at the substep's start and end; the same for a rigid
+  // solid.
+  const std::int32_t* triangles;   // [triangles][3]
+  const std::int32_t* neighbours;  // [triangles][3] triangle across the edge from corner k to k + 1, -1: none
+  const float* vertices_before;    // [vertices][3] [m]
+  const float* vertices;           // [vertices][3] [m]
   std::int32_t triangle_count;
 };
 

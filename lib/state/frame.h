@@ -16,26 +16,26 @@ struct Surface {
 
 // Constant over a run. Strand and particle order are the grooms', in the order the scene lists them.
 struct RunHeader {
-  std::string name;                // the scene's
-  std::string scene_json;          // as run: every default filled in
+  std::string name;        // the scene's
+  std::string scene_json;  // as run: every default filled in
   std::string scene_hash;
   std::string program_version;
-  std::string backend;             // cpu, cuda
-  std::string instruction_set;     // avx512, avx2, generic, sm_90, ...
-  std::string precision;           // float, double
-  std::string length_unit;         // m, cm, ... as in the scene
+  std::string backend;          // cpu, cuda
+  std::string instruction_set;  // avx512, avx2, generic, sm_90, ...
+  std::string precision;        // float, double
+  std::string length_unit;      // m, cm, ... as in the scene
   double metres_per_unit = 1;
-  std::string up;                  // x, y, z
+  std::string up;  // x, y, z
   double fps = 24;
-  int first_frame = 1, last_frame = 1;     // that this run writes
-  std::vector<std::int64_t> offsets;       // [strands + 1]
-  std::vector<std::int32_t> root_triangle; // [strands], -1: none
-  std::vector<float> root_barycentric;     // [strands * 3]
-  std::vector<float> rest_position;        // [particles * 3] scene units
-  std::vector<float> width;                // [particles] diameter, scene units
+  int first_frame = 1, last_frame = 1;      // that this run writes
+  std::vector<std::int64_t> offsets;        // [strands + 1]
+  std::vector<std::int32_t> root_triangle;  // [strands], -1: none
+  std::vector<float> root_barycentric;      // [strands * 3]
+  std::vector<float> rest_position;         // [particles * 3] scene units
+  std::vector<float> width;                 // [particles] diameter, scene units
   std::vector<std::int32_t> groom_of_strand;
   std::vector<std::string> groom_names;
-  std::vector<Surface> surfaces;           // where the cache's fields name `solids`
+  std::vector<Surface> surfaces;  // where the cache's fields name `solids`
 };
 
 // The solver's figures for a frame: deterministic ones only (no wall-clock value, no thread count).
@@ -43,10 +43,10 @@ using Figures = std::vector<std::pair<std::string, double>>;
 
 struct Frame {
   int number = 0;
-  double time = 0;                                    // [s] after the first frame
-  std::vector<float> position;                        // [particles * 3] scene units
-  std::vector<float> velocity;                        // [particles * 3] scene units per second; empty: not asked for
-  std::vector<std::vector<float>> surface_vertices;   // as RunHeader::surfaces, [vertices * 3]
+  double time = 0;              // [s] after the first frame
+  std::vector<float> position;  // [particles * 3] scene units
+  std::vector<float> velocity;  // [particles * 3] scene units per second; empty: not asked for
+  std::vector<std::vector<float>> surface_vertices;  // as RunHeader::surfaces, [vertices * 3]
   Figures figures;
 };
 
@@ -56,12 +56,14 @@ struct Snapshot {
   std::map<std::string, std::vector<std::byte>> arrays;
 };
 
-// Receives the frames in order. `write` may return before the frame is on disk; errors surface at the next call.
+// Receives the frames in order. `write` may return before the frame is on disk; errors surface at the next
+// call.
 class FrameSink {
  public:
   virtual ~FrameSink() = default;
-  virtual void write(Frame frame, Snapshot snapshot, double seconds) = 0;  // seconds: wall time, to the timings file
-  virtual void finish() = 0;                                               // waits until everything is on disk
+  virtual void write(Frame frame, Snapshot snapshot,
+                     double seconds) = 0;  // seconds: wall time, to the timings file
+  virtual void finish() = 0;               // waits until everything is on disk
 };
 
 }  // namespace ringlet::state

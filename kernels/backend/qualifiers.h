@@ -1,0 +1,23 @@
+// What makes one source compile for the host's instruction sets and for CUDA.
+//
+// Every kernel lives in an inline namespace named after the instruction set it is compiled for (RINGLET_ISA),
+// so that no function compiled with AVX-512 can stand in for its namesake in a program that runs on an older
+// processor.
+//
+// RINGLET_KERNEL marks what must be inlined (packs live in registers), RINGLET_FUNCTION what the compiler may
+// call.
+#pragma once
+
+#ifndef RINGLET_ISA
+#define RINGLET_ISA host
+#endif
+
+#if defined(__CUDACC__)
+#define RINGLET_KERNEL __host__ __device__ __forceinline__
+#define RINGLET_FUNCTION __host__ __device__ inline
+#define RINGLET_UNROLL _Pragma("unroll")
+#else
+#define RINGLET_KERNEL inline __attribute__((always_inline))
+#define RINGLET_FUNCTION inline
+#define RINGLET_UNROLL _Pragma("GCC unroll 4")
+#endif

@@ -1,0 +1,74 @@
+// Strands in memory, and everything a strand step is told. Plain pointers, SI units, all stiffness per unit
+// mass.
+//
+// Strands are sorted by particle count and packed kLanes to a batch. A per-particle array holds, for each row
+// (batch.row + particle), its components one after the other, each kLanes wide: unit stride for a lane pack
+// on the CPU, coalesced for a thread per strand on the GPU. A strand shorter than its batch ends in inert
+// particles: no spring reaches them, they rest at zero.
+//
+// Positions are relative to the strand's root point (its first particle) at the same time, so that precision
+// is that of the strand's own length wherever in the world it is.
+#pragma once
+#include <cstdint>
+
+namespace ringlet::kernels {
+
+inline constexpr int kLanes = 16;
+
+enum Coupling { kEdge, kBend, kTwist, kIntegrity, kAngular, kCouplings };
+
+// Constant over a run.
+template <class T>
+struct StrandBatches {
+  std::int32_t batches;
+  const std::int32_t* row;  // [batches + 1] first row of each batch
+  const T* count;           // [batches][kLanes] particles of each strand; 0 for a lane without a strand
+  const T* rest;            // [rows][3] rest shape relative to its root, in the rest pose's axes [m]
+  const T* rest_length;     // [rows][3] rest distance to the next, second next and third next particle [m]
+  const T*
+      stiffness;     // [rows][kCouplings] [1/s^2], or null where StrandParameters::stiffness holds everywhere
+  const T* preload;  // [batches][3] -g in the strand's root frame at the first frame [m/s^2]; 0: no preload
+};
+
+template <class T>
+struct StrandState {
+  T* position;  // [rows][3] relative to the root point [m]
+  T* velocity;  // [rows][3] in the world [m/s]
+};
+
+// Motion of the root frames over one substep, [batches][kRootValues]: rotation at its start (9, row-major;
+// from the rest pose's axes to the world's), the rotation's change (9), the root point's displacement (3)
+// [m].
+inline constexpr int kRootValues = 21;
+
+template <class T>
+struct StrandParameters {
+  T step;                   // h [s]
+  T gravity[3];             // [m/s^2]
+  T stiffness[kCouplings];  // [1/s^2]
+  T drag;                   // G / m [1/s]
+  T damping;                // material damping beta [s]
+  T geometric_stiffness;    // 1 on, 0 off
+  bool consistent_angular;  // angular tangent kappa l_i / |x_i - x_{i-1}| D, otherwise the papers' kappa D
+  bool exact_integrity;     // integrity tangent kappa I, otherwise the papers' kappa D
+  std::int32_t clamped;  // prescribed particles at the root: 1 hinged, 2 tangent clamped (0 free, in tests)
+  std::int32_t length_iterations;  // Newton iterations of the length projection; 0: none
+  T length_tolerance;              // largest edge strain it leaves [-]
+  T strain_limit;                  // beyond either limit the strand counts as diverged
+  T speed_limit;                   // [m/s]
+};
+
+// Written for each strand and substep, [batches][kFigures].
+enum StrandFigure { kStrain, kIterations, kSubdivisions, kSpeed, kDiverged, kFigures };
+
+template <class T>
+struct StrandStep {
+  StrandBatches<T> batches;
+  StrandState<T> state;
+  const T* roots;  // [batches][kRootValues]
+  StrandParameters<T> parameters;
+  T* figures;  // [batches][kFigures]: largest edge strain left [-], Newton iterations, substeps taken,
+               // largest speed [m/s], 1 where diverged or not finite
+};
+
+}  // namespace ringlet::kernels

@@ -1,0 +1,126 @@
+#include "state/strand_model.h"
+
+#include "kernels/backend/vector.h"
+
+namespace ringlet::state {
+
+using kernels::kCouplings;
+using kernels::kLanes;
+using kernels::kRootValues;
+
+namespace {
+
+template <class T>
+using V = kernels::Vector3<T>;
+
+template <class T>
+V<T> get(const AlignedVector<T>& array, const StrandLayout& layout, std::size_t strand, int particle) {
+  return {array[layout.at(strand, particle, 3, 0)], array[layout.at(strand, particle, 3, 1)],
+          array[layout.at(strand, particle, 3, 2)]};
+}
+
+}  // namespace
+
+template <class T>
+StrandModel<T>::StrandModel(const StrandInput& input)
+    : layout(input.counts),
+      count(layout.batches() * kLanes, T(0)),
+      rest(layout.rows() * 3 * kLanes, T(0)),
+      rest_length(layout.rows() * 3 * kLanes, T(0)),
+      stiffness(input.stiffness.empty() ? 0 : layout.rows() * kCouplings * kLanes, T(0)),
+      preload(layout.batches() * 3 * kLanes, T(0)) {
+  std::size_t first = 0;
+  for (std::size_t strand = 0; strand < input.counts.size(); ++strand) {
+    const int n = input.counts[strand];
+    count[layout.at_strand(strand, 1, 0)] = static_cast<T>(n);
+    for (int i = 0; i < n; ++i) {
+      const Vec3 relative = input.rest[first + i] - input.rest[first];
+      for (int c = 0; c < 3; ++c) rest[layout.at(strand, i, 3, c)] = static_cast<T>(relative[c]);
+      for (int k = 0; k < kCouplings && !stiffness.empty(); ++k)
+        stiffness[layout.at(strand, i, kCouplings, k)] =
+            static_cast<T>(input.stiffness[(first + i) * kCouplings + k]);
+    }
+    // By the very operations of the step's springs, so that the rest shape carries no force at all.
+    for (int i = 0; i < n; ++i)
+      for (int a = 0; a < 3 && i + 1 + a < n; ++a)
+        rest_length[layout.at(strand, i, 3, a)] =
+            kernels::length(get(rest, layout, strand, i + 1 + a) - get(rest, layout, strand, i));
+    if (input.preload) {
+      const Vec3 against = -(input.first_rotation[strand].transpose() * *input.preload);
+      for (int c = 0; c < 3; ++c) preload[layout.at_strand(strand, 3, c)] = static_cast<T>(against[c]);
+    }
+    first += n;
+  }
+}
+
+template <class T>
+kernels::StrandBatches<T> StrandModel<T>::view() const {
+  return {layout.batches(), layout.row().data(), count.data(),
+          rest.data(),      rest_length.data(),  stiffness.empty() ? nullptr : stiffness.data(),
+          preload.data()};
+}
+
+template <class T>
+std::size_t StrandModel<T>::bytes() const {
+  return (count.size() + rest.size() + rest_length.size() + stiffness.size() + preload.size()) * sizeof(T);
+}
+
+template <class T>
+StrandState<T>::StrandState(const StrandLayout& layout)
+    : position(layout.rows() * 3 * kLanes, T(0)),
+      velocity(layout.rows() * 3 * kLanes, T(0)),
+      root_motion(static_cast<std::size_t>(layout.batches()) * kRootValues * kLanes, T(0)),
+      root_points(static_cast<std::size_t>(layout.batches()) * 3 * kLanes, 0.0) {}
+
+template <class T>
+std::size_t StrandState<T>::bytes() const {
+  return (position.size() + velocity.size() + root_motion.size()) * sizeof(T) +
+         root_points.size() * sizeof(double);
+}
+
+template <class T>
+void set_root_motion(StrandState<T>& state, const StrandLayout& layout, std::size_t strand,
+                     const Pose& before, const Pose& after) {
+  const auto put = [&](int value, double x) {
+    state.root_motion[layout.at_strand(strand, kRootValues, value)] = static_cast<T>(x);
+  };
+  for (int k = 0; k < 9; ++k) {
+    put(k, before.rotation(k / 3, k % 3));
+    put(9 + k, after.rotation(k / 3, k % 3) - before.rotation(k / 3, k % 3));
+  }
+  for (int c = 0; c < 3; ++c) {
+    put(18 + c, after.position[c] - before.position[c]);
+    state.root_points[layout.at_strand(strand, 3, c)] = after.position[c];
+  }
+}
+
+template <class T>
+void pose_at_rest(StrandState<T>& state, const StrandModel<T>& model, std::span<const Pose> roots) {
+  const StrandLayout& layout = model.layout;
+  for (std::size_t strand = 0; strand < layout.strands(); ++strand) {
+    kernels::Matrix3<T> rotation;
+    for (int k = 0; k < 9; ++k) rotation.m[k] = static_cast<T>(roots[strand].rotation(k / 3, k % 3));
+    for (int i = 0; i < layout.count(strand); ++i) {
+      const V<T> x = rotation * get(model.rest, layout, strand, i);
+      const T components[3] = {x.x, x.y, x.z};
+      for (int c = 0; c < 3; ++c) {
+        state.position[layout.at(strand, i, 3, c)] = components[c];
+        state.velocity[layout.at(strand, i, 3, c)] = T(0);
+      }
+    }
+    for (int c = 0; c < 3; ++c) state.root_points[layout.at_strand(strand, 3, c)] = roots[strand].position[c];
+  }
+}
+
+template struct StrandModel<float>;
+template struct StrandModel<double>;
+template struct StrandState<float>;
+template struct StrandState<double>;
+template void set_root_motion(StrandState<float>&, const StrandLayout&, std::size_t, const Pose&,
+                              const Pose&);
+template void set_root_motion(StrandState<double>&, const StrandLayout&, std::size_t, const Pose&,
+                              const Pose&);
+template void pose_at_rest(StrandState<float>&, const StrandModel<float>&, std::span<const Pose>);
+template void pose_at_rest(StrandState<double>&, const StrandModel<double>&, std::span<const Pose>);
+
+}  // namespace ringlet::state

@@ -1,0 +1,55 @@
+// The strands of a run: what is constant (Model) and what changes (State), in the solver's precision T.
+#pragma once
+#include <tbb/cache_aligned_allocator.h>
+
+#include <optional>
+#include <vector>
+
+#include "core/geometry.h"
+#include "state/strand_layout.h"
+
+namespace ringlet::state {
+
+template <class T>
+using AlignedVector = std::vector<T, tbb::cache_aligned_allocator<T>>;
+
+// What a model is made of, strand after strand in file order.
+struct StrandInput {
+  std::vector<std::int32_t> counts;  // [strands] particles
+  std::vector<Vec3> rest;            // [particles] rest shape, world axes at rest [m]
+  std::vector<float> stiffness;      // [particles * kCouplings] [1/s^2], empty: uniform
+  std::vector<Mat3> first_rotation;  // [strands] root rotation at the first frame; for the preload
+  std::optional<Vec3> preload;       // gravity to preload against [m/s^2]; empty: no preload
+};
+
+template <class T>
+struct StrandModel {
+  StrandLayout layout;
+  AlignedVector<T> count, rest, rest_length, stiffness, preload;
+
+  explicit StrandModel(const StrandInput& input);
+  kernels::StrandBatches<T> view() const;
+  std::size_t bytes() const;
+};
+
+template <class T>
+struct StrandState {
+  AlignedVector<T> position, velocity;  // [rows][3]
+  AlignedVector<T> root_motion;         // [batches][kRootValues]
+  AlignedVector<double> root_points;    // [batches][3] at the substep's end [m]
+
+  explicit StrandState(const StrandLayout& layout);
+  kernels::StrandState<T> view() { return {position.data(), velocity.data()}; }
+  std::size_t bytes() const;
+};
+
+// Writes the motion of one strand's root frame over a substep.
+template <class T>
+void set_root_motion(StrandState<T>& state, const StrandLayout& layout, std::size_t strand,
+                     const Pose& before, const Pose& after);
+
+// The rest shape carried to these root poses, at rest: positions relative to the root, no velocity.
+template <class T>
+void pose_at_rest(StrandState<T>& state, const StrandModel<T>& model, std::span<const Pose> roots);
+
+}  // namespace ringlet::state

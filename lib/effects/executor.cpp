@@ -1,0 +1,66 @@
+#include "effects/executor.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include "core/error.h"
+#include "kernels/launch/launch.h"
+
+namespace ringlet::effects {
+namespace {
+
+using kernels::InstructionSet;
+
+InstructionSet choose(const std::string& name) {
+  const InstructionSet best = kernels::best_instruction_set();
+  if (name.empty()) return best;
+  for (const InstructionSet set : {InstructionSet::kGeneric, InstructionSet::kAvx2, InstructionSet::kAvx512})
+    if (set <= best && name == kernels::name_of(set)) return set;
+  throw Error(ErrorKind::kUsage, "", "this processor has no instruction set `" + name + "`",
+              std::string("its widest is ") + kernels::name_of(best));
+}
+
+// Strands are independent: batches in any order on any thread give the same bits.
+template <class T>
+class CpuExecutor : public Executor<T> {
+ public:
+  CpuExecutor(const state::StrandModel<T>& model, InstructionSet set)
+      : set_(set),
+        kernels_(kernels::cpu_kernels<T>(set)),
+        batches_(model.layout.batches()),
+        scratch_(state::AlignedVector<T>(kernels::scratch_reals(model.layout.longest()))) {}
+
+  std::string backend() const override { return "cpu"; }
+  std::string instruction_set() const override { return kernels::name_of(set_); }
+  void submit(const state::StrandState<T>&) override {}
+  void fetch(state::StrandState<T>&) override {}
+  void strand_step(const kernels::StrandStep<T>& step) override { run(kernels_.strand_step, step); }
+  void contact_step(const kernels::ContactStep<T>& step) override { run(kernels_.contact_step, step); }
+
+ private:
+  template <class Step>
+  void run(void (*kernel)(const Step&, int, int, T*), const Step& step) {
+    constexpr int kGrain = 8;  // batches: some 10 microseconds of work
+    tbb::parallel_for(tbb::blocked_range<int>(0, batches_, kGrain), [&](const tbb::blocked_range<int>& range) {
+      kernel(step, range.begin(), range.end(), scratch_.local().data());
+    });
+  }
+
+  InstructionSet set_;
+  const kernels::KernelTable<T>& kernels_;
+  int batches_;
+  tbb::enumerable_thread_specific<state::AlignedVector<T>> scratch_;
+};
+
+}  // namespace
+
+template <class T>
+std::unique_ptr<Executor<T>> make_cpu_executor(const state::StrandModel<T>& model, const std::string& instruction_set) {
+  return std::make_unique<CpuExecutor<T>>(model, choose(instruction_set));
+}
+
+template std::unique_ptr<Executor<float>> make_cpu_executor(const state::StrandModel<float>&, const std::string&);
+template std::unique_ptr<Executor<double>> make_cpu_executor(const state::StrandModel<double>&, const std::string&);
+
+}  // namespace ringlet::effects

@@ -1,0 +1,35 @@
+// Where the kernels run: on the CPU's threads, or on a CUDA device.
+#pragma once
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "kernels/solid/solid_view.h"
+#include "state/strand_model.h"
+
+namespace ringlet::kernels {
+template <class T> struct ContactStep;
+}
+
+namespace ringlet::effects {
+
+// Runs kernels over all batches. The state given to the constructor's model lives with the executor while it steps:
+// `fetch` brings it back to the host, `submit` takes the host's.
+template <class T>
+class Executor {
+ public:
+  virtual ~Executor() = default;
+  virtual std::string backend() const = 0;          // cpu, cuda
+  virtual std::string instruction_set() const = 0;  // avx512, avx2, generic, sm_90, ...
+  virtual void submit(const state::StrandState<T>& state) = 0;
+  virtual void fetch(state::StrandState<T>& state) = 0;
+  virtual void strand_step(const kernels::StrandStep<T>& step) = 0;
+  virtual void contact_step(const kernels::ContactStep<T>& step) = 0;
+};
+
+// `instruction_set`: avx512, avx2 or generic; empty: the widest this processor has. Throws Error{kUsage} for one it
+// has not.
+template <class T>
+std::unique_ptr<Executor<T>> make_cpu_executor(const state::StrandModel<T>& model, const std::string& instruction_set);
+
+}  // namespace ringlet::effects

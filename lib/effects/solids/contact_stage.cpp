@@ -1,0 +1,100 @@
+#include "effects/solids/contact_stage.h"
+
+#include <algorithm>
+
+#include "kernels/solid/response.h"
+
+namespace ringlet::effects {
+namespace {
+
+using kernels::kLanes;
+
+template <class T>
+class ContactStage : public Stage<T> {
+ public:
+  ContactStage(const scene::Scene& scene, std::vector<solids::Solid>& solids,
+               const std::vector<unsigned char>& collides, const state::StrandModel<T>& model,
+               state::StrandState<T>& state)
+      : scene_(scene),
+        solids_(solids),
+        model_(model),
+        state_(state),
+        views_(solids.size()),
+        collides_(static_cast<std::size_t>(model.layout.batches()) * kLanes, T(0)),
+        figures_(static_cast<std::size_t>(model.layout.batches()) * kernels::kContactFigures * kLanes) {
+    for (std::size_t strand = 0; strand < collides.size(); ++strand)
+      collides_[model.layout.at_strand(strand, 1, 0)] = collides[strand] ? T(1) : T(0);
+  }
+
+  std::string name() const override { return "solids"; }
+  std::size_t bytes() const override {
+    std::size_t total = (collides_.size() + figures_.size()) * sizeof(T);
+    for (const solids::Solid& solid : solids_) total += solid.bytes();
+    return total;
+  }
+  int launches() const override { return 1; }
+
+  void run(Executor<T>& executor, const Substep& substep, FrameReport& report) override {
+    for (std::size_t k = 0; k < solids_.size(); ++k) views_[k] = solids_[k].at(substep.time_before, substep.time);
+    kernels::ContactStep<T> step{};
+    step.batches = model_.view();
+    step.state = state_.view();
+    step.root_points = state_.root_points.data();
+    step.collides = collides_.data();
+    step.solids = views_.data();
+    step.solid_count = static_cast<std::int32_t>(views_.size());
+    step.step = static_cast<T>(substep.step);
+    step.clamped = scene_.model.clamped_particles;
+    step.rounds = scene_.effects.collision.iterations;
+    const auto& lengths = scene_.effects.inextensible;
+    const bool project = lengths && (lengths->cadence == scene::Cadence::kSubstep || substep.last_of_frame);
+    step.length_iterations = project ? lengths->max_iterations : 0;
+    step.length_tolerance = project ? static_cast<T>(lengths->tolerance) : T(0);
+    step.figures = figures_.data();
+    executor.contact_step(step);
+    gather(substep, report);
+  }
+
+ private:
+  T figure(std::size_t strand, int which) const {
+    return figures_[model_.layout.at_strand(strand, kernels::kContactFigures, which)];
+  }
+
+  void gather(const Substep& substep, FrameReport& report) {
+    for (std::size_t strand = 0; strand < model_.layout.strands(); ++strand) {
+      report.swept += figure(strand, kernels::kSwept);
+      if (!(figure(strand, kernels::kTouched) > T(0))) continue;
+      report.moved[strand] = 1;
+      report.strain[strand] = static_cast<float>(figure(strand, kernels::kContactStrain));
+      report.contact_rounds = std::max(report.contact_rounds, static_cast<double>(figure(strand, kernels::kRounds)));
+      if (substep.last_of_frame)
+        report.pushed = std::max(report.pushed, static_cast<double>(figure(strand, kernels::kPushed)));
+    }
+  }
+
+  const scene::Scene& scene_;
+  std::vector<solids::Solid>& solids_;
+  const state::StrandModel<T>& model_;
+  state::StrandState<T>& state_;
+  std::vector<kernels::SolidView> views_;
+  state::AlignedVector<T> collides_, figures_;
+};
+
+}  // namespace
+
+template <class T>
+std::unique_ptr<Stage<T>> make_contact_stage(const scene::Scene& scene, std::vector<solids::Solid>& solids,
+                                             const std::vector<unsigned char>& collides,
+                                             const state::StrandModel<T>& model, state::StrandState<T>& state) {
+  return std::make_unique<ContactStage<T>>(scene, solids, collides, model, state);
+}
+
+template std::unique_ptr<Stage<float>> make_contact_stage(const scene::Scene&, std::vector<solids::Solid>&,
+                                                          const std::vector<unsigned char>&,
+                                                          const state::StrandModel<float>&, state::StrandState<float>&);
+template std::unique_ptr<Stage<double>> make_contact_stage(const scene::Scene&, std::vector<solids::Solid>&,
+                                                           const std::vector<unsigned char>&,
+                                                           const state::StrandModel<double>&,
+                                                           state::StrandState<double>&);
+
+}  // namespace ringlet::effects

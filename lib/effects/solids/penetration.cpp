@@ -1,0 +1,91 @@
+#include "effects/solids/penetration.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+
+#include "kernels/solid/surface.h"
+
+namespace ringlet::effects {
+namespace {
+
+// How far outside a moved point comes to rest [m]: past the rounding of single precision, nothing one could see.
+constexpr double kClearance = 2e-5;
+
+struct Surface {
+  const kernels::SolidView& solid;
+
+  kernels::SurfaceSample<double> at(const Vec3& x) const {
+    const Vec3 away = x - Vec3(solid.translation[0], solid.translation[1], solid.translation[2]);
+    return kernels::sample_surface(
+        solid, kernels::rotate_back(solid.rotation, kernels::Vector3<double>{away.x(), away.y(), away.z()}));
+  }
+  Vec3 normal(const kernels::SurfaceSample<double>& sample) const {
+    const kernels::Vector3<double> n = kernels::rotate(solid.rotation, sample.normal);
+    return {n.x, n.y, n.z};
+  }
+};
+
+// Out along the normal; again where another part of the surface is in the way.
+void push_out(const Surface& surface, Vec3& x) {
+  constexpr int kTries = 8;
+  for (int i = 0; i < kTries; ++i) {
+    const auto sample = surface.at(x);
+    if (!sample.exact || sample.distance >= 0.5 * kClearance) return;
+    x += (kClearance - sample.distance) * surface.normal(sample);
+  }
+}
+
+struct StrandReport {
+  std::int64_t inside = 0;
+  double deepest = 0;
+  bool buried = false;
+};
+
+StrandReport inspect(const Surface& surface, std::span<const Vec3> points) {
+  StrandReport report;
+  double length = 0;
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    length += (points[i] - points[i - 1]).norm();
+    const double distance = surface.at(points[i]).distance;
+    if (distance >= 0) continue;
+    ++report.inside;
+    report.deepest = std::max(report.deepest, -distance);
+  }
+  report.buried = -surface.at(points[0]).distance > length;
+  return report;
+}
+
+}  // namespace
+
+PenetrationReport resolve_penetration(scene::Penetration policy, const kernels::SolidView& solid,
+                                      std::span<const std::int64_t> offsets, std::span<Vec3> points,
+                                      std::span<unsigned char> collides, std::span<unsigned char> prune) {
+  const Surface surface{solid};
+  const std::size_t strands = offsets.size() - 1;
+  std::vector<StrandReport> reports(strands);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, strands, 64), [&](const auto& range) {
+    for (std::size_t s = range.begin(); s < range.end(); ++s) {
+      const std::span<Vec3> strand = points.subspan(offsets[s], offsets[s + 1] - offsets[s]);
+      reports[s] = inspect(surface, strand);
+      if (reports[s].buried) {
+        collides[s] = 0;
+      } else if (policy == scene::Penetration::kPushOut) {
+        for (std::size_t i = 1; i < strand.size(); ++i) push_out(surface, strand[i]);
+      } else if (policy == scene::Penetration::kPrune && reports[s].inside > 0) {
+        prune[s] = 1;
+      }
+    }
+  });
+  PenetrationReport total;
+  for (const StrandReport& report : reports) {
+    total.inside += report.inside;
+    total.strands += report.inside > 0;
+    total.deepest = std::max(total.deepest, report.deepest);
+    total.buried += report.buried;
+  }
+  return total;
+}
+
+}  // namespace ringlet::effects

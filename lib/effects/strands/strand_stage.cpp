@@ -1,0 +1,102 @@
+#include "effects/strands/strand_stage.h"
+
+#include <algorithm>
+
+namespace ringlet::effects {
+
+using kernels::kLanes;
+
+template <class T>
+kernels::StrandParameters<T> strand_parameters(const scene::Scene& scene) {
+  const scene::Model& model = scene.model;
+  const Vec3 gravity = scene.effects.gravity.value_or(Vec3::Zero());
+  kernels::StrandParameters<T> p{};
+  for (int c = 0; c < 3; ++c) p.gravity[c] = static_cast<T>(gravity[c]);
+  p.stiffness[kernels::kEdge] = static_cast<T>(model.stiffness.edge);
+  p.stiffness[kernels::kBend] = static_cast<T>(model.stiffness.bend);
+  p.stiffness[kernels::kTwist] = static_cast<T>(model.stiffness.twist);
+  p.stiffness[kernels::kIntegrity] = static_cast<T>(model.stiffness.integrity);
+  p.stiffness[kernels::kAngular] = static_cast<T>(model.stiffness.angular);
+  p.drag = static_cast<T>(model.drag);
+  p.damping = static_cast<T>(model.material_damping);
+  p.geometric_stiffness = model.geometric_stiffness ? T(1) : T(0);
+  p.consistent_angular = model.angular_tangent == scene::AngularTangent::kConsistent;
+  p.exact_integrity = model.integrity_tangent == scene::IntegrityTangent::kExact;
+  p.clamped = model.clamped_particles;
+  if (const auto& lengths = scene.effects.inextensible) {
+    p.length_iterations = lengths->max_iterations;
+    p.length_tolerance = static_cast<T>(lengths->tolerance);
+  }
+  p.strain_limit = static_cast<T>(scene.limits.edge_strain);
+  p.speed_limit = static_cast<T>(scene.limits.speed);
+  return p;
+}
+
+namespace {
+
+template <class T>
+class StrandStage : public Stage<T> {
+ public:
+  StrandStage(const scene::Scene& scene, const state::StrandModel<T>& model, state::StrandState<T>& state)
+      : model_(model),
+        state_(state),
+        parameters_(strand_parameters<T>(scene)),
+        lengths_at_frame_end_(scene.effects.inextensible &&
+                              scene.effects.inextensible->cadence == scene::Cadence::kFrame),
+        figures_(static_cast<std::size_t>(model.layout.batches()) * kernels::kFigures * kLanes) {}
+
+  std::string name() const override { return "strands"; }
+  std::size_t bytes() const override { return model_.bytes() + state_.bytes() + figures_.size() * sizeof(T); }
+  int launches() const override { return 1; }
+  std::int64_t diverged_strand() const override { return diverged_; }
+
+  void run(Executor<T>& executor, const Substep& substep, FrameReport& report) override {
+    kernels::StrandStep<T> step{model_.view(), state_.view(), state_.root_motion.data(), parameters_, figures_.data()};
+    step.parameters.step = static_cast<T>(substep.step);
+    if (lengths_at_frame_end_ && !substep.last_of_frame) step.parameters.length_iterations = 0;
+    executor.strand_step(step);
+    gather(report);
+  }
+
+ private:
+  T figure(std::size_t strand, int which) const {
+    return figures_[model_.layout.at_strand(strand, kernels::kFigures, which)];
+  }
+
+  void gather(FrameReport& report) {
+    diverged_ = -1;
+    for (std::size_t strand = 0; strand < model_.layout.strands(); ++strand) {
+      const double iterations = figure(strand, kernels::kIterations);
+      report.strain[strand] = static_cast<float>(figure(strand, kernels::kStrain));
+      report.length_iterations += iterations;
+      report.most_length_iterations = std::max(report.most_length_iterations, iterations);
+      report.subdivided += figure(strand, kernels::kSubdivisions) > T(1) ? 1 : 0;
+      report.speed = std::max(report.speed, static_cast<double>(figure(strand, kernels::kSpeed)));
+      if (diverged_ < 0 && !(figure(strand, kernels::kDiverged) <= T(0))) diverged_ = static_cast<std::int64_t>(strand);
+    }
+  }
+
+  const state::StrandModel<T>& model_;
+  state::StrandState<T>& state_;
+  kernels::StrandParameters<T> parameters_;
+  bool lengths_at_frame_end_;
+  state::AlignedVector<T> figures_;
+  std::int64_t diverged_ = -1;
+};
+
+}  // namespace
+
+template <class T>
+std::unique_ptr<Stage<T>> make_strand_stage(const scene::Scene& scene, const state::StrandModel<T>& model,
+                                            state::StrandState<T>& state) {
+  return std::make_unique<StrandStage<T>>(scene, model, state);
+}
+
+template kernels::StrandParameters<float> strand_parameters(const scene::Scene&);
+template kernels::StrandParameters<double> strand_parameters(const scene::Scene&);
+template std::unique_ptr<Stage<float>> make_strand_stage(const scene::Scene&, const state::StrandModel<float>&,
+                                                         state::StrandState<float>&);
+template std::unique_ptr<Stage<double>> make_strand_stage(const scene::Scene&, const state::StrandModel<double>&,
+                                                          state::StrandState<double>&);
+
+}  // namespace ringlet::effects

@@ -29,10 +29,8 @@ RINGLET_KERNEL float fma(float a, float b, float c) { return __builtin_fmaf(a, b
 RINGLET_KERNEL double fma(double a, double b, double c) { return __builtin_fma(a, b, c); }
 RINGLET_KERNEL float sqrt(float a) { return __builtin_sqrtf(a); }
 RINGLET_KERNEL double sqrt(double a) { return __builtin_sqrt(a); }
-template <class T>
-RINGLET_KERNEL T select(bool mask, T a, T b) {
-  return mask ? a : b;
-}
+RINGLET_KERNEL float select(bool mask, float a, float b) { return mask ? a : b; }
+RINGLET_KERNEL double select(bool mask, double a, double b) { return mask ? a : b; }
 RINGLET_KERNEL bool any(bool mask) { return mask; }
 
 // Comparisons with NaN are false, so `max(a, NaN)` and `min(a, NaN)` are a: health checks look at squares,

@@ -42,9 +42,10 @@ class CpuExecutor : public Executor<T> {
   template <class Step>
   void run(void (*kernel)(const Step&, int, int, T*), const Step& step) {
     constexpr int kGrain = 8;  // batches: some 10 microseconds of work
-    tbb::parallel_for(tbb::blocked_range<int>(0, batches_, kGrain), [&](const tbb::blocked_range<int>& range) {
-      kernel(step, range.begin(), range.end(), scratch_.local().data());
-    });
+    tbb::parallel_for(tbb::blocked_range<int>(0, batches_, kGrain),
+                      [&](const tbb::blocked_range<int>& range) {
+                        kernel(step, range.begin(), range.end(), scratch_.local().data());
+                      });
   }
 
   InstructionSet set_;
@@ -56,11 +57,14 @@ class CpuExecutor : public Executor<T> {
 }  // namespace
 
 template <class T>
-std::unique_ptr<Executor<T>> make_cpu_executor(const state::StrandModel<T>& model, const std::string& instruction_set) {
+std::unique_ptr<Executor<T>> make_cpu_executor(const state::StrandModel<T>& model,
+                                               const std::string& instruction_set) {
   return std::make_unique<CpuExecutor<T>>(model, choose(instruction_set));
 }
 
-template std::unique_ptr<Executor<float>> make_cpu_executor(const state::StrandModel<float>&, const std::string&);
-template std::unique_ptr<Executor<double>> make_cpu_executor(const state::StrandModel<double>&, const std::string&);
+template std::unique_ptr<Executor<float>> make_cpu_executor(const state::StrandModel<float>&,
+                                                            const std::string&);
+template std::unique_ptr<Executor<double>> make_cpu_executor(const state::StrandModel<double>&,
+                                                             const std::string&);
 
 }  // namespace ringlet::effects

@@ -8,13 +8,14 @@
 #include "state/strand_model.h"
 
 namespace ringlet::kernels {
-template <class T> struct ContactStep;
+template <class T>
+struct ContactStep;
 }
 
 namespace ringlet::effects {
 
-// Runs kernels over all batches. The state given to the constructor's model lives with the executor while it steps:
-// `fetch` brings it back to the host, `submit` takes the host's.
+// Runs kernels over all batches. The state given to the constructor's model lives with the executor while it
+// steps: `fetch` brings it back to the host, `submit` takes the host's.
 template <class T>
 class Executor {
  public:
@@ -27,9 +28,10 @@ class Executor {
   virtual void contact_step(const kernels::ContactStep<T>& step) = 0;
 };
 
-// `instruction_set`: avx512, avx2 or generic; empty: the widest this processor has. Throws Error{kUsage} for one it
-// has not.
+// `instruction_set`: avx512, avx2 or generic; empty: the widest this processor has. Throws Error{kUsage} for
+// one it has not.
 template <class T>
-std::unique_ptr<Executor<T>> make_cpu_executor(const state::StrandModel<T>& model, const std::string& instruction_set);
+std::unique_ptr<Executor<T>> make_cpu_executor(const state::StrandModel<T>& model,
+                                               const std::string& instruction_set);
 
 }  // namespace ringlet::effects

@@ -1,4 +1,5 @@
-// A stage of the substep. The pipeline walks a list of them; what a scene does not call for is not in the list.
+// A stage of the substep. The pipeline walks a list of them; what a scene does not call for is not in the
+// list.
 #pragma once
 #include <cstddef>
 #include <string>
@@ -17,15 +18,15 @@ struct Substep {
 
 // What a frame looked like strand by strand, gathered by the stages over its substeps.
 struct FrameReport {
-  std::vector<float> strain;          // [strands] edge strain at the frame's end [-]
-  std::vector<unsigned char> moved;   // [strands] 1 where a solid moved the strand in this frame
-  double length_iterations = 0;       // Newton iterations, sum over strands and substeps
+  std::vector<float> strain;         // [strands] edge strain at the frame's end [-]
+  std::vector<unsigned char> moved;  // [strands] 1 where a solid moved the strand in this frame
+  double length_iterations = 0;      // Newton iterations, sum over strands and substeps
   double most_length_iterations = 0;
-  double subdivided = 0;              // strand steps that were taken in pieces
-  double speed = 0;                   // largest particle speed of the frame [m/s]
-  double contact_rounds = 0;          // most rounds of length and contact projections
-  double pushed = 0;                  // largest last push-out at the frame's end [m]
-  double swept = 0;                   // particles that out-ran the narrow band and were looked for along their way
+  double subdivided = 0;      // strand steps that were taken in pieces
+  double speed = 0;           // largest particle speed of the frame [m/s]
+  double contact_rounds = 0;  // most rounds of length and contact projections
+  double pushed = 0;          // largest last push-out at the frame's end [m]
+  double swept = 0;           // particles that out-ran the narrow band and were looked for along their way
 };
 
 // A strand that left the limits or is no longer finite.
@@ -40,8 +41,8 @@ class Stage {
  public:
   virtual ~Stage() = default;
   virtual std::string name() const = 0;
-  virtual std::size_t bytes() const = 0;        // that it owns
-  virtual int launches() const = 0;             // kernel launches a substep
+  virtual std::size_t bytes() const = 0;  // that it owns
+  virtual int launches() const = 0;       // kernel launches a substep
   virtual void run(Executor<T>& executor, const Substep& substep, FrameReport& report) = 0;
   // The first strand that diverged in the last `run`, -1 for none.
   virtual std::int64_t diverged_strand() const { return -1; }

@@ -35,7 +35,8 @@ class ContactStage : public Stage<T> {
   int launches() const override { return 1; }
 
   void run(Executor<T>& executor, const Substep& substep, FrameReport& report) override {
-    for (std::size_t k = 0; k < solids_.size(); ++k) views_[k] = solids_[k].at(substep.time_before, substep.time);
+    for (std::size_t k = 0; k < solids_.size(); ++k)
+      views_[k] = solids_[k].at(substep.time_before, substep.time);
     kernels::ContactStep<T> step{};
     step.batches = model_.view();
     step.state = state_.view();
@@ -66,7 +67,8 @@ class ContactStage : public Stage<T> {
       if (!(figure(strand, kernels::kTouched) > T(0))) continue;
       report.moved[strand] = 1;
       report.strain[strand] = static_cast<float>(figure(strand, kernels::kContactStrain));
-      report.contact_rounds = std::max(report.contact_rounds, static_cast<double>(figure(strand, kernels::kRounds)));
+      report.contact_rounds =
+          std::max(report.contact_rounds, static_cast<double>(figure(strand, kernels::kRounds)));
       if (substep.last_of_frame)
         report.pushed = std::max(report.pushed, static_cast<double>(figure(strand, kernels::kPushed)));
     }
@@ -85,13 +87,15 @@ class ContactStage : public Stage<T> {
 template <class T>
 std::unique_ptr<Stage<T>> make_contact_stage(const scene::Scene& scene, std::vector<solids::Solid>& solids,
                                              const std::vector<unsigned char>& collides,
-                                             const state::StrandModel<T>& model, state::StrandState<T>& state) {
+                                             const state::StrandModel<T>& model,
+                                             state::StrandState<T>& state) {
   return std::make_unique<ContactStage<T>>(scene, solids, collides, model, state);
 }
 
 template std::unique_ptr<Stage<float>> make_contact_stage(const scene::Scene&, std::vector<solids::Solid>&,
                                                           const std::vector<unsigned char>&,
-                                                          const state::StrandModel<float>&, state::StrandState<float>&);
+                                                          const state::StrandModel<float>&,
+                                                          state::StrandState<float>&);
 template std::unique_ptr<Stage<double>> make_contact_stage(const scene::Scene&, std::vector<solids::Solid>&,
                                                            const std::vector<unsigned char>&,
                                                            const state::StrandModel<double>&,

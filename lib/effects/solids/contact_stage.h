@@ -13,6 +13,7 @@ namespace ringlet::effects {
 template <class T>
 std::unique_ptr<Stage<T>> make_contact_stage(const scene::Scene& scene, std::vector<solids::Solid>& solids,
                                              const std::vector<unsigned char>& collides,
-                                             const state::StrandModel<T>& model, state::StrandState<T>& state);
+                                             const state::StrandModel<T>& model,
+                                             state::StrandState<T>& state);
 
 }  // namespace ringlet::effects

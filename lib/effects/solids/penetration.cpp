@@ -10,7 +10,8 @@
 namespace ringlet::effects {
 namespace {
 
-// How far outside a moved point comes to rest [m]: past the rounding of single precision, nothing one could see.
+// How far outside a moved point comes to rest [m]: past the rounding of single precision, nothing one could
+// see.
 constexpr double kClearance = 2e-5;
 
 struct Surface {

@@ -51,7 +51,8 @@ class StrandStage : public Stage<T> {
   std::int64_t diverged_strand() const override { return diverged_; }
 
   void run(Executor<T>& executor, const Substep& substep, FrameReport& report) override {
-    kernels::StrandStep<T> step{model_.view(), state_.view(), state_.root_motion.data(), parameters_, figures_.data()};
+    kernels::StrandStep<T> step{model_.view(), state_.view(), state_.root_motion.data(), parameters_,
+                                figures_.data()};
     step.parameters.step = static_cast<T>(substep.step);
     if (lengths_at_frame_end_ && !substep.last_of_frame) step.parameters.length_iterations = 0;
     executor.strand_step(step);
@@ -72,7 +73,8 @@ class StrandStage : public Stage<T> {
       report.most_length_iterations = std::max(report.most_length_iterations, iterations);
       report.subdivided += figure(strand, kernels::kSubdivisions) > T(1) ? 1 : 0;
       report.speed = std::max(report.speed, static_cast<double>(figure(strand, kernels::kSpeed)));
-      if (diverged_ < 0 && !(figure(strand, kernels::kDiverged) <= T(0))) diverged_ = static_cast<std::int64_t>(strand);
+      if (diverged_ < 0 && !(figure(strand, kernels::kDiverged) <= T(0)))
+        diverged_ = static_cast<std::int64_t>(strand);
     }
   }
 
@@ -94,9 +96,11 @@ std::unique_ptr<Stage<T>> make_strand_stage(const scene::Scene& scene, const sta
 
 template kernels::StrandParameters<float> strand_parameters(const scene::Scene&);
 template kernels::StrandParameters<double> strand_parameters(const scene::Scene&);
-template std::unique_ptr<Stage<float>> make_strand_stage(const scene::Scene&, const state::StrandModel<float>&,
+template std::unique_ptr<Stage<float>> make_strand_stage(const scene::Scene&,
+                                                         const state::StrandModel<float>&,
                                                          state::StrandState<float>&);
-template std::unique_ptr<Stage<double>> make_strand_stage(const scene::Scene&, const state::StrandModel<double>&,
+template std::unique_ptr<Stage<double>> make_strand_stage(const scene::Scene&,
+                                                          const state::StrandModel<double>&,
                                                           state::StrandState<double>&);
 
 }  // namespace ringlet::effects

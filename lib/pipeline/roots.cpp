@@ -1,0 +1,74 @@
+#include "pipeline/roots.h"
+
+#include "solids/keyframes.h"
+
+namespace ringlet::pipeline {
+
+using Motion = solids::AnimatedMesh::Motion;
+
+Roots::Roots(const solids::AnimatedMesh* head, const scene::Frames& frames) : head_(head), frames_(frames) {}
+
+void Roots::add_attached(groom::Attachment attachment, std::vector<Vec3> rest) {
+  strands_ += rest.size();
+  groups_.push_back({std::move(attachment), {}, std::move(rest)});
+}
+
+void Roots::add_fixed(const scene::Animation& animation, std::vector<Vec3> rest) {
+  strands_ += rest.size();
+  groups_.push_back({std::nullopt, animation, std::move(rest)});
+}
+
+bool Roots::still() const {
+  for (const Group& group : groups_) {
+    if (group.attachment ? head_->motion() != Motion::kStill : !group.animation.keys.empty()) return false;
+  }
+  return true;
+}
+
+namespace {
+
+void move_rigidly(const Pose& whole, std::span<const Vec3> rest, std::span<Pose> out) {
+  for (std::size_t s = 0; s < rest.size(); ++s)
+    out[s] = {whole.rotation, whole.rotation * rest[s] + whole.position};
+}
+
+Pose keyed_pose(const scene::Animation& animation, const scene::Frames& frames, double time) {
+  const auto at = [&](double seconds) {
+    return solids::sample_keys(animation.keys, animation.interpolation, frames.first + seconds * frames.fps);
+  };
+  solids::Similarity now = at(std::max(time, 0.0));
+  if (time < 0) {  // preroll: from the rest pose to the first one
+    const double preroll = frames.preroll / frames.fps;
+    now = solids::interpolate(solids::Similarity{}, now, solids::ease(1.0 + time / preroll));
+  }
+  return {now.rotate.toRotationMatrix(), now.translate};
+}
+
+}  // namespace
+
+void Roots::pose_group(const Group& group, double time, std::span<const Vec3> head_vertices,
+                       std::span<Pose> out) const {
+  if (!group.attachment) {
+    const bool moves = !group.animation.keys.empty();
+    move_rigidly(moves ? keyed_pose(group.animation, frames_, time) : Pose{}, group.rest, out);
+  } else if (head_->motion() == Motion::kDeforming) {
+    group.attachment->pose(head_vertices, out);
+  } else {
+    move_rigidly(head_->motion() == Motion::kRigid ? head_->pose(time) : Pose{}, group.rest, out);
+  }
+}
+
+void Roots::pose(double time, std::span<Pose> out) const {
+  std::vector<Vec3> head_vertices;
+  if (head_ && head_->motion() == Motion::kDeforming) {
+    head_vertices.resize(head_->vertex_count());
+    head_->sample(time, head_vertices);
+  }
+  std::size_t first = 0;
+  for (const Group& group : groups_) {
+    pose_group(group, time, head_vertices, out.subspan(first, group.rest.size()));
+    first += group.rest.size();
+  }
+}
+
+}  // namespace ringlet::pipeline

@@ -1,0 +1,62 @@
+// A scene made ready to run, and the loop that runs it.
+#pragma once
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <optional>
+
+#include "core/error.h"
+#include "pipeline/plan.h"
+#include "scene/scene_desc.h"
+#include "state/frame.h"
+
+namespace ringlet::pipeline {
+
+enum class Backend { kAuto, kCpu, kCuda };
+enum class Precision { kFloat, kDouble };
+
+struct Options {
+  Backend backend = Backend::kAuto;
+  Precision precision = Precision::kFloat;
+  std::string instruction_set;  // of the CPU: avx512, avx2, generic; empty: the widest there is
+};
+
+struct FrameRange {
+  int first, last;  // written; stepping always starts at the scene's first frame
+};
+
+// Seconds that a frame spent in each stage, by the plan's names.
+using StageSeconds = std::vector<std::pair<std::string, double>>;
+
+// The simulation left the scene's limits or is no longer finite: Error{kDiverged} with the failing state.
+class Diverged : public Error {
+ public:
+  Diverged(state::Frame frame, std::string stage, std::int64_t strand, std::int64_t particle,
+           std::string what);
+
+  state::Frame frame;
+  std::string stage;
+  std::int64_t strand, particle;  // the particle counts from the strand's root; -1: unknown
+};
+
+struct RunControl {
+  std::optional<state::Snapshot> resume;   // go on from here
+  const std::atomic<int>* stop = nullptr;  // non-zero: end after the frame in flight
+  std::function<void(int frame, double seconds, const StageSeconds&)>
+      on_frame;  // after each stepped frame, preroll too
+};
+
+class Simulation {
+ public:
+  // Reads every asset and allocates. Throws Error{kInput}, Error{kUsage} (double on CUDA), Error{kDevice}.
+  static std::unique_ptr<Simulation> create(const scene::Scene& scene, const Options& options);
+  virtual ~Simulation() = default;
+
+  virtual const Plan& plan() const = 0;
+  virtual state::RunHeader header(const FrameRange& range) const = 0;
+  // Steps to range.last and hands frames of the range to the sink. Returns false if stopped early. Throws
+  // Diverged.
+  virtual bool run(const FrameRange& range, state::FrameSink& sink, const RunControl& control) = 0;
+};
+
+}  // namespace ringlet::pipeline

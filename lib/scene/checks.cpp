@@ -10,7 +10,7 @@ namespace ringlet::scene {
 namespace fs = std::filesystem;
 namespace {
 
-// Whether `name` is `pattern` with its run of n `#` replaced by n or more digits.
+// Whether `name` is `pattern` with its run of n `#` replaced by n digits, or by more without a leading zero.
 bool in_sequence(const std::string& name, const std::string& pattern) {
   const std::size_t first = pattern.find('#');
   const std::size_t count = pattern.find_last_of('#') + 1 - first;
@@ -18,6 +18,7 @@ bool in_sequence(const std::string& name, const std::string& pattern) {
   if (name.size() < pattern.size() || !name.starts_with(pattern.substr(0, first)) || !name.ends_with(tail))
     return false;
   const std::string digits = name.substr(first, name.size() - first - tail.size());
+  if (digits.size() > count && digits.front() == '0') return false;
   return std::all_of(digits.begin(), digits.end(), [](unsigned char c) { return std::isdigit(c) != 0; });
 }
 

@@ -58,7 +58,7 @@ constexpr Case kSchemaCases[] = {
     {R"({"name": "a/b"})",
      R"(scene#/name: found "a/b", expected text of at most 100 characters that matches ^[A-Za-z0-9_][A-Za-z0-9_.-]*$)"},
     {R"({"groom": {"name": ""}})",
-     R"(scene#/groom/name: found "", expected text of at most 100 characters, not empty)"},
+     R"(scene#/groom/name: found "", expected text of at most 255 characters, not empty)"},
     {R"({"groom": {"file": ""}})",
      R"(scene#/groom/file: found "", expected the path of a file, or a list of at least 1, each the path of a file)"},
     // minItems, maxItems, items, uniqueItems
@@ -111,6 +111,8 @@ constexpr Case kMeaningCases[] = {
      R"(scene#/head/mesh: found "sequence/body.####.obj", expected the path of a mesh file (no file matches DIR/sequence/body.####.obj))"},
     {R"({"head": {"mesh": "sequence/face.#####.obj"}})",
      R"(scene#/head/mesh: found "sequence/face.#####.obj", expected the path of a mesh file (no file matches DIR/sequence/face.#####.obj))"},
+    {R"({"head": {"mesh": "sequence/face.###.obj"}})",
+     R"(scene#/head/mesh: found "sequence/face.###.obj", expected the path of a mesh file (no file matches DIR/sequence/face.###.obj))"},
     {R"({"head": {"mesh": "sequence/face.##_##.obj"}})",
      R"(scene#/head/mesh: found "sequence/face.##_##.obj", expected the path of a mesh file (the # of a sequence stand together))"},
     // frames and keys

@@ -159,7 +159,8 @@ TEST_F(SceneLoad, RunsNoEffectThatIsAbsent) {
 TEST_F(SceneLoad, FindsTheFilesOfASequence) {
   const Scene s = load_json(minimal(), {"/head/mesh=\"sequence/face.####.obj\""});
   EXPECT_EQ(s.head->file, folder_ / "sequence/face.####.obj");
-  load_json(minimal(), {"/head/mesh=\"sequence/face.#.obj\""});
+  std::ofstream(folder_ / "sequence/body.1200.obj") << "present";
+  load_json(minimal(), {"/head/mesh=\"sequence/body.##.obj\""});  // frames beyond 99
 }
 
 // ---- Defaults

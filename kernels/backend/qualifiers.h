@@ -5,7 +5,8 @@
 // processor.
 //
 // RINGLET_KERNEL marks what must be inlined (packs live in registers), RINGLET_FUNCTION what the compiler may
-// call.
+// call, RINGLET_OUTLINED what a GPU had better call: inlined at each of its many uses it would cost more
+// registers than a thread has.
 #pragma once
 
 #ifndef RINGLET_ISA
@@ -15,9 +16,17 @@
 #if defined(__CUDACC__)
 #define RINGLET_KERNEL __host__ __device__ __forceinline__
 #define RINGLET_FUNCTION __host__ __device__ inline
-#define RINGLET_UNROLL _Pragma("unroll")
+#define RINGLET_OUTLINED __host__ __device__ __noinline__
 #else
 #define RINGLET_KERNEL inline __attribute__((always_inline))
 #define RINGLET_FUNCTION inline
+#define RINGLET_OUTLINED inline
+#endif
+
+#if defined(__CUDA_ARCH__)
+#define RINGLET_UNROLL _Pragma("unroll")
+#elif defined(__CUDACC__)
+#define RINGLET_UNROLL  // the host's half of a .cu file runs no kernels, and g++ knows no such pragma
+#else
 #define RINGLET_UNROLL _Pragma("GCC unroll 4")
 #endif

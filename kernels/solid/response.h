@@ -257,7 +257,7 @@ RINGLET_FUNCTION void collide_strands(const ContactStep<Scalar<R>>& step, int ba
     store(pack.normal + k * stride, R(0));
   }
   LaneFigures<T> figures[kWidth];
-  T open[kWidth], counts[kWidth], strains[kWidth], rounds[kWidth];
+  T open[kWidth], counts[kWidth] = {}, strains[kWidth], rounds[kWidth];
   alignas(64) T open_now[kWidth];
   bool any_open = false;
   const auto at_lane = [&](int l) {

@@ -88,7 +88,7 @@ inline constexpr float kNearVoxels = 1.5f;
 
 // `p` in level-set coordinates at the substep's end [m].
 template <class T>
-RINGLET_FUNCTION SurfaceSample<T> sample_surface(const SolidView& solid, Vector3<T> p) {
+RINGLET_OUTLINED SurfaceSample<T> sample_surface(const SolidView& solid, Vector3<T> p) {
   const LevelSetSample<T> first = sample_level_set(solid.level_set[0], p);
   LevelSetSample<T> second = first;
   T distance = first.distance;

@@ -103,8 +103,7 @@ struct Strings {
 
 }  // namespace
 
-// ---- Object
-// ------------------------------------------------------------------------------------------------------
+// ---- Object -------------------------------------------------------------------------------------
 
 void Object::fail(const std::string& what) const {
   const std::string where = path_ == "/" ? file_->string() : file_->string() + ":" + path_;
@@ -203,8 +202,7 @@ std::vector<std::string> Object::children() const {
   return names;
 }
 
-// ---- Data sets
-// ---------------------------------------------------------------------------------------------------
+// ---- Data sets ----------------------------------------------------------------------------------
 
 Object Object::write_array(const std::string& name, hid_t type, const void* values, std::size_t count,
                            const Dims& dims) const {
@@ -338,8 +336,7 @@ std::string Object::read_string(const std::string& name) const {
   return strings[0];
 }
 
-// ---- Files
-// -------------------------------------------------------------------------------------------------------
+// ---- Files --------------------------------------------------------------------------------------
 
 namespace {
 

@@ -133,8 +133,7 @@ FrameRecord record_of(const state::Frame& frame) {
   return record;
 }
 
-// ---- Identity
-// ----------------------------------------------------------------------------------------------------
+// ---- Identity -----------------------------------------------------------------------------------
 
 void write_identity(const h5::Object& root, Content content) {
   root.set("format", std::string(kFormat));
@@ -158,8 +157,7 @@ Content check_identity(const h5::Object& root) {
   root.fail("holds '" + word + "', which this program does not know");
 }
 
-// ---- Header
-// ------------------------------------------------------------------------------------------------------
+// ---- Header -------------------------------------------------------------------------------------
 
 void write_header(const h5::Object& root, const state::RunHeader& header) {
   root.set("name", header.name);
@@ -233,8 +231,7 @@ Storage read_storage(const h5::Object& root) {
   root.fail("is compressed by '" + word + "', which this program does not know");
 }
 
-// ---- Frames
-// ------------------------------------------------------------------------------------------------------
+// ---- Frames -------------------------------------------------------------------------------------
 
 void write_frame(const h5::Object& root, const state::Frame& frame, const Storage& storage) {
   root.set("frame", static_cast<std::int32_t>(frame.number));
@@ -276,8 +273,7 @@ FrameRecord read_record(const h5::Object& root) {
   return record;
 }
 
-// ---- The sequence
-// ------------------------------------------------------------------------------------------------
+// ---- The sequence -------------------------------------------------------------------------------
 
 namespace {
 
@@ -340,8 +336,7 @@ void write_sequence(const h5::Object& root, const std::map<int, FrameRecord>& fr
   }
 }
 
-// ---- Failed state
-// ------------------------------------------------------------------------------------------------
+// ---- Failed state -------------------------------------------------------------------------------
 
 void write_single(const h5::Object& root, const state::Frame& frame) {
   write_tables(root, {{frame.number, record_of(frame)}});
@@ -384,8 +379,7 @@ Failure read_failure(const h5::Object& root) {
           root.number<std::int64_t>("particle")};
 }
 
-// ---- State
-// -------------------------------------------------------------------------------------------------------
+// ---- State --------------------------------------------------------------------------------------
 
 void write_snapshot(const h5::Object& root, const state::Snapshot& snapshot, std::uint64_t header_hash) {
   root.set("frame", static_cast<std::int32_t>(snapshot.frame));

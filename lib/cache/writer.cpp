@@ -96,8 +96,7 @@ struct CacheWriter::Impl {
     files.remove_leftovers();
   }
 
-  // ---- The writing thread
-  // --------------------------------------------------------------------------------------
+  // ---- The writing thread -----------------------------------------------------------------------
 
   void run() {
     try {
@@ -176,8 +175,7 @@ struct CacheWriter::Impl {
     master_stale = false;
   }
 
-  // ---- The caller's side
-  // ---------------------------------------------------------------------------------------
+  // ---- The caller's side ------------------------------------------------------------------------
 
   void push(Item item) {
     std::unique_lock lock(mutex);
@@ -236,8 +234,7 @@ void CacheWriter::write(state::Frame frame, state::Snapshot snapshot, double sec
 
 void CacheWriter::finish() { impl_->finish(); }
 
-// ---- Free functions
-// ----------------------------------------------------------------------------------------------
+// ---- Free functions -----------------------------------------------------------------------------
 
 void check_destination(const fs::path& directory, const std::string& name, Existing existing) {
   const Files files{directory, name};

@@ -80,21 +80,27 @@ TEST_F(CacheTest, ADeletedFrameReadsAsNotANumber) {
 }
 
 TEST_F(CacheTest, TheSameFramesAreTheSameBytes) {
-  for (const Compression compression : {Compression::kNone, Compression::kDefault, Compression::kQuantised}) {
-    const WriterOptions options{.compression = compression, .error = 1e-4, .existing = Existing::kOverwrite};
-    state::RunHeader other = small_header();  // provenance is the master's alone
-    other.program_version = "9.9";
-    other.instruction_set = "avx512";
-    write_small(directory_ / "a", 1, 2, options);
-    std::this_thread::sleep_for(std::chrono::milliseconds(1100));  // a time stamp would differ
-    write_small(directory_ / "b", 1, 2, options, other);
-    for (const char* name : {"small.0001.h5", "small.0002.h5", "small.state.h5"})
-      EXPECT_TRUE(bytes_of_file(directory_ / "a" / name) == bytes_of_file(directory_ / "b" / name)) << name;
+  const auto write = [&](const char* into, const state::RunHeader& header) {
+    for (const Compression compression : {Compression::kNone, Compression::kDefault, Compression::kQuantised})
+      write_small(directory_ / into / to_string(compression), 1, 2,
+                  {.compression = compression, .error = 1e-4}, header);
+  };
+  write("a", small_header());
+  std::this_thread::sleep_for(std::chrono::milliseconds(1100));  // a time stamp would differ
+  state::RunHeader other = small_header();                       // provenance is the master's alone
+  other.program_version = "9.9";
+  other.instruction_set = "avx512";
+  write("b", other);
+  for (const char* compression : {"none", "default", "quantised"}) {
+    for (const char* name : {"small.0001.h5", "small.0002.h5", "small.state.h5"}) {
+      EXPECT_TRUE(bytes_of_file(directory_ / "a" / compression / name) ==
+                  bytes_of_file(directory_ / "b" / compression / name))
+          << compression << ' ' << name;
+    }
   }
 }
 
-// ---- Resuming
-// ----------------------------------------------------------------------------------------------------
+// ---- Resuming -----------------------------------------------------------------------------------
 
 TEST_F(CacheTest, ResumingGoesOnFromTheLastState) {
   write_small(directory_, 1, 2);

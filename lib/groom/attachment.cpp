@@ -23,12 +23,12 @@ Mat3 triangle_frame(std::span<const Vec3> vertices, const Triangle& triangle, co
   const Vec3& origin = vertices[triangle[0]];
   const Vec3 edge = vertices[triangle[1]] - origin, side = vertices[triangle[2]] - origin;
   const Vec3 area = edge.cross(side);
-  const double edge_length = edge.norm(), twice_area = area.norm();
-  if (!(edge_length > 0)) return fallback;
+  const double edge_squared = edge.squaredNorm(), area_squared = area.squaredNorm();
+  if (!(edge_squared > 0)) return fallback;
   Mat3 frame;
-  frame.col(0) = edge / edge_length;
-  if (twice_area > 1e-12 * edge_length * side.norm()) {
-    frame.col(2) = area / twice_area;
+  frame.col(0) = edge * (1 / std::sqrt(edge_squared));
+  if (area_squared > 1e-24 * edge_squared * side.squaredNorm()) {
+    frame.col(2) = area * (1 / std::sqrt(area_squared));
   } else {  // no area: the old normal made perpendicular to the edge, or any that is
     const Vec3 normal = fallback.col(2) - fallback.col(2).dot(frame.col(0)) * frame.col(0);
     frame.col(2) = normal.norm() > 1e-6 ? Vec3(normal.normalized()) : Vec3(frame.col(0).unitOrthogonal());

@@ -1,0 +1,166 @@
+// The kernels on a CUDA device: one thread a strand, the same source as the CPU's with R = float.
+#include "kernels/launch/cuda_kernels.h"
+
+#include "kernels/backend/parallel_for.h"
+#include "kernels/launch/cuda_solids.h"
+#include "kernels/launch/cuda_threads.h"
+
+namespace ringlet::kernels {
+namespace {
+
+constexpr int kDevice = 0;       // the first of CUDA_VISIBLE_DEVICES
+constexpr int kLowestMajor = 8;  // compute capability 8.0 (kernels/CMakeLists.txt)
+
+CudaDevice describe_device() {
+  int devices = 0;
+  check_cuda(cudaGetDeviceCount(&devices), "looking for a device");
+  if (devices == 0) throw CudaError("CUDA: no device");
+  cudaDeviceProp properties;
+  check_cuda(cudaGetDeviceProperties(&properties, kDevice), "asking about the device");
+  if (properties.major < kLowestMajor) {
+    throw CudaError("CUDA: " + std::string(properties.name) + " has compute capability " +
+                    std::to_string(properties.major) + "." + std::to_string(properties.minor) +
+                    ", 8.0 is the lowest that serves");
+  }
+  CudaDevice device{properties.name, properties.major, properties.minor, 0, 0};
+  check_cuda(cudaSetDevice(kDevice), "taking the device");
+  check_cuda(cudaMemGetInfo(&device.free_memory, &device.memory), "asking about memory");
+  return device;
+}
+
+template <class T>
+std::span<const T> array(const T* data, std::int64_t size) {
+  return {data, static_cast<std::size_t>(size)};
+}
+
+class Strands final : public CudaStrands {
+ public:
+  Strands(const StrandBatches<float>& model, CudaTiming timing) : stream_(timing), batches_(model.batches) {
+    const std::int64_t rows = model.row[batches_], lanes = std::int64_t{batches_} * kLanes;
+    row_.upload(array(model.row, batches_ + 1), stream_.get());
+    count_.upload(array(model.count, lanes), stream_.get());
+    rest_.upload(array(model.rest, rows * 3 * kLanes), stream_.get());
+    rest_length_.upload(array(model.rest_length, rows * 3 * kLanes), stream_.get());
+    if (model.stiffness) stiffness_.upload(array(model.stiffness, rows * kCouplings * kLanes), stream_.get());
+    preload_.upload(array(model.preload, lanes * 3), stream_.get());
+    const std::vector<std::int32_t> begin = scratch_particles(model.row, batches_);
+    scratch_begin_.upload(begin, stream_.get());
+    scratch_.resize(std::size_t(begin.back()) * kScratchReals * kWarp);
+    collides_.upload(std::vector<float>(lanes, 1.0f), stream_.get());
+    position_.resize(rows * 3 * kLanes), velocity_.resize(rows * 3 * kLanes);
+    root_motion_.resize(lanes * kRootValues), root_points_.resize(lanes * 3);
+    strand_figures_.resize(lanes * kFigures), contact_figures_.resize(lanes * kContactFigures);
+    clear(position_), clear(velocity_), clear(root_motion_), clear(root_points_);
+    clear(strand_figures_), clear(contact_figures_);
+    stream_.synchronize();
+  }
+
+  void upload_state(std::span<const float> position, std::span<const float> velocity) override {
+    send("position", position, position_), send("velocity", velocity, velocity_);
+  }
+  void download_state(std::span<float> position, std::span<float> velocity) override {
+    fetch("position", position_, position), fetch("velocity", velocity_, velocity);
+    stream_.synchronize();
+  }
+  void upload_roots(std::span<const float> motion, std::span<const double> points) override {
+    send("root motion", motion, root_motion_), send("root points", points, root_points_);
+  }
+  void upload_collides(std::span<const float> collides) override { send("collides", collides, collides_); }
+  void upload_solids(std::span<const SolidView> solids, std::int64_t interval) override {
+    solids_.upload(solids, interval, stream_.get());
+  }
+
+  void strand_step(const StrandParameters<float>& parameters) override {
+    const StrandStep<float> step{batches(), state(), root_motion_.data(), parameters, strand_figures_.data()};
+    stream_.parallel_for("strand step", threads(), StrandStepThread{step, scratch()});
+  }
+  void contact_step(const ContactParameters& p) override {
+    const ContactStep<float> step{batches(),
+                                  state(),
+                                  root_points_.data(),
+                                  collides_.data(),
+                                  solids_.views(),
+                                  solids_.count(),
+                                  p.step,
+                                  p.clamped,
+                                  p.rounds,
+                                  p.length_iterations,
+                                  p.length_tolerance,
+                                  contact_figures_.data()};
+    stream_.parallel_for("contact step", threads(), ContactStepThread{step, scratch()});
+  }
+
+  void download_figures(std::span<float> strands, std::span<float> contacts) override {
+    if (!strands.empty()) fetch("strand figures", strand_figures_, strands);
+    if (!contacts.empty()) fetch("contact figures", contact_figures_, contacts);
+    stream_.synchronize();
+  }
+  void synchronize() override { stream_.synchronize(); }
+  std::vector<CudaLaunches> launches() override { return stream_.launches(); }
+  std::size_t bytes() const override {
+    return row_.bytes() + count_.bytes() + rest_.bytes() + rest_length_.bytes() + stiffness_.bytes() +
+           preload_.bytes() + position_.bytes() + velocity_.bytes() + root_motion_.bytes() +
+           root_points_.bytes() + collides_.bytes() + strand_figures_.bytes() + contact_figures_.bytes() +
+           scratch_begin_.bytes() + scratch_.bytes() + solids_.bytes();
+  }
+
+ private:
+  int threads() const { return batches_ * kLanes; }
+  StrandBatches<float> batches() const {
+    return {batches_,          row_.data(),    count_.data(), rest_.data(), rest_length_.data(),
+            stiffness_.data(), preload_.data()};
+  }
+  StrandState<float> state() const { return {position_.data(), velocity_.data()}; }
+  WarpScratch scratch() const { return {scratch_begin_.data(), scratch_.data()}; }
+
+  template <class T>
+  void clear(DeviceBuffer<T>& buffer) {
+    check_cuda(cudaMemsetAsync(buffer.data(), 0, buffer.size() * sizeof(T), stream_.get()), "clearing");
+  }
+  static void check_size(const char* what, std::size_t given, std::size_t expected) {
+    if (given == expected) return;
+    throw CudaError("CUDA: " + std::string(what) + ": " + std::to_string(given) + " values, expected " +
+                    std::to_string(expected));
+  }
+  template <class T>
+  void send(const char* what, std::span<const T> host, DeviceBuffer<T>& device) {
+    check_size(what, host.size(), device.size());
+    device.upload(host, stream_.get());
+  }
+  template <class T>
+  void fetch(const char* what, const DeviceBuffer<T>& device, std::span<T> host) {
+    check_size(what, host.size(), device.size());
+    device.download(host, stream_.get());
+  }
+
+  CudaStream stream_;
+  std::int32_t batches_;
+  DeviceBuffer<std::int32_t> row_;
+  DeviceBuffer<float> count_, rest_, rest_length_, stiffness_, preload_;
+  DeviceBuffer<float> position_, velocity_, root_motion_, collides_;
+  DeviceBuffer<double> root_points_;
+  DeviceBuffer<float> strand_figures_, contact_figures_;
+  DeviceBuffer<std::int32_t> scratch_begin_;
+  DeviceBuffer<float> scratch_;
+  CudaSolids solids_;
+};
+
+}  // namespace
+
+bool cuda_compiled() { return true; }
+
+std::optional<CudaDevice> find_cuda_device(std::string* why_not) {
+  try {
+    return describe_device();
+  } catch (const CudaError& error) {
+    if (why_not) *why_not = error.what();
+    return std::nullopt;
+  }
+}
+
+std::unique_ptr<CudaStrands> make_cuda_strands(const StrandBatches<float>& model, CudaTiming timing) {
+  describe_device();
+  return std::make_unique<Strands>(model, timing);
+}
+
+}  // namespace ringlet::kernels

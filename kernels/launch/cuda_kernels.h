@@ -1,0 +1,93 @@
+// The kernels on a CUDA device, as the program calls them: plain C++, whether or not nvcc was there to build
+// them.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "kernels/solid/solid_view.h"
+#include "kernels/strand/strand_batch.h"
+
+namespace ringlet::kernels {
+
+// What the CUDA runtime refused, and during what.
+class CudaError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+// Whether this program holds the CUDA kernels at all.
+bool cuda_compiled();
+
+struct CudaDevice {
+  std::string name;
+  int major, minor;         // compute capability
+  std::size_t memory;       // [bytes]
+  std::size_t free_memory;  // [bytes] at the time of asking
+};
+
+// The device that the kernels would run on: the first that the driver shows (CUDA_VISIBLE_DEVICES chooses).
+// Empty where there is none that serves; `why_not`, where given, then says why.
+std::optional<CudaDevice> find_cuda_device(std::string* why_not = nullptr);
+
+enum class CudaTiming { kOff, kOn };
+
+// Time spent in the launches of one name, measured on the device.
+struct CudaLaunches {
+  std::string name;
+  std::int64_t count;
+  double seconds;
+};
+
+struct ContactParameters {
+  float step;  // h [s]
+  std::int32_t clamped;
+  std::int32_t rounds;             // cap on the alternation of length and contact projections
+  std::int32_t length_iterations;  // 0: lengths are not projected
+  float length_tolerance;          // largest edge strain left [-]
+};
+
+// The strands of a run on the device. Arrays are laid out as on the host (StrandBatches, StrandState,
+// ContactStep), and every upload is done with the host's memory when it returns. Steps are queued on one
+// stream and run on their own; downloads wait for what was queued before. Any call may throw CudaError, also
+// for a step queued earlier. For use by one thread at a time.
+class CudaStrands {
+ public:
+  virtual ~CudaStrands() = default;
+
+  virtual void upload_state(std::span<const float> position, std::span<const float> velocity) = 0;
+  virtual void download_state(std::span<float> position, std::span<float> velocity) = 0;
+
+  // The root frames' motion over the next substep, [batches][kRootValues], and the root points at its end in
+  // the world [batches][3] [m], which only contact_step reads.
+  virtual void upload_roots(std::span<const float> motion, std::span<const double> points) = 0;
+  virtual void strand_step(const StrandParameters<float>& parameters) = 0;
+
+  // [batches] 1 where a strand collides, 0 where it is left alone. Until called, all collide.
+  virtual void upload_collides(std::span<const float> collides) = 0;
+  // The solids over the next substep; pointers are the host's. Level sets and surfaces stay on the device:
+  // those of a deforming solid are copied again when `interval`, the number of the frame interval that the
+  // substep lies in, is another than last time, its vertices every time; those of a rigid one only when its
+  // pointers change.
+  virtual void upload_solids(std::span<const SolidView> solids, std::int64_t interval) = 0;
+  virtual void contact_step(const ContactParameters& parameters) = 0;
+
+  // Of the last step of each kind: [batches][kFigures] and [batches][kContactFigures]; an empty span is left
+  // out.
+  virtual void download_figures(std::span<float> strands, std::span<float> contacts) = 0;
+
+  virtual void synchronize() = 0;
+  virtual std::vector<CudaLaunches> launches() = 0;  // so far, in order of first use; empty without timing
+  virtual std::size_t bytes() const = 0;             // device memory held
+};
+
+// `model` is the host's and is copied. Throws CudaError where no device serves or its memory does not
+// suffice.
+std::unique_ptr<CudaStrands> make_cuda_strands(const StrandBatches<float>& model, CudaTiming timing);
+
+}  // namespace ringlet::kernels

@@ -1,0 +1,75 @@
+// Which strand a CUDA thread works on, and where its scratch is. Nothing here needs a device: the tests run
+// every thread on the host.
+//
+// A thread takes one strand, so a warp two batches. Scratch is interleaved by the warp's width, so that its
+// threads touch neighbouring words; a warp's scratch is as long as the longer of its batches needs.
+#pragma once
+#include <algorithm>
+#include <vector>
+
+#include "kernels/solid/response.h"
+#include "kernels/strand/strand_step.h"
+
+namespace ringlet::kernels {
+inline namespace RINGLET_ISA {
+
+inline constexpr int kWarp = 32;
+inline constexpr int kBatchesPerWarp = kWarp / kLanes;
+static_assert(kWarp % kLanes == 0);
+
+// Values a particle, enough for either step.
+inline constexpr int kScratchReals = kStepReals > kContactReals ? kStepReals : kContactReals;
+
+struct StrandThread {
+  int batch, lane;
+};
+RINGLET_FUNCTION StrandThread strand_of_thread(int thread) { return {thread / kLanes, thread % kLanes}; }
+
+// [warps + 1] where each warp's scratch begins, in particles; `row` is StrandBatches::row on the host.
+inline std::vector<std::int32_t> scratch_particles(const std::int32_t* row, std::int32_t batches) {
+  std::vector<std::int32_t> begin{0};
+  for (std::int32_t batch = 0; batch < batches; batch += kBatchesPerWarp) {
+    std::int32_t longest = 0;
+    for (std::int32_t b = batch; b < std::min(batch + kBatchesPerWarp, batches); ++b)
+      longest = std::max(longest, row[b + 1] - row[b]);
+    begin.push_back(begin.back() + longest);
+  }
+  return begin;
+}
+RINGLET_FUNCTION std::int64_t scratch_offset(int particle, int thread) {
+  return static_cast<std::int64_t>(particle) * kScratchReals * kWarp + thread % kWarp;
+}
+
+// Scratch on the device, or wherever the threads run.
+struct WarpScratch {
+  const std::int32_t* begin;  // scratch_particles
+  float* values;
+
+  RINGLET_FUNCTION float* of(int thread) const {
+    return values + scratch_offset(begin[thread / kWarp], thread);
+  }
+};
+
+// The two steps, one call a thread.
+struct StrandStepThread {
+  StrandStep<float> step;
+  WarpScratch scratch;
+
+  RINGLET_FUNCTION void operator()(int thread) const {
+    const StrandThread at = strand_of_thread(thread);
+    step_strands<float>(step, at.batch, at.lane, scratch.of(thread), kWarp);
+  }
+};
+
+struct ContactStepThread {
+  ContactStep<float> step;
+  WarpScratch scratch;
+
+  RINGLET_FUNCTION void operator()(int thread) const {
+    const StrandThread at = strand_of_thread(thread);
+    collide_strands<float>(step, at.batch, at.lane, scratch.of(thread), kWarp);
+  }
+};
+
+}  // namespace RINGLET_ISA
+}  // namespace ringlet::kernels

@@ -21,14 +21,15 @@ def read_report(runner, path):
     """Yields (test, "passed" or "failed" or "skipped", reason)."""
     for case in ElementTree.parse(path).iter("testcase"):
         name = f"{runner}: {case.get('name')}"
+        skipped = case.find("skipped")
         if case.find("failure") is not None or case.find("error") is not None:
             yield name, "failed", ""
-        elif case.find("skipped") is not None and case.get("status") != "disabled":
-            yield name, "skipped", skip_reason(case)
-        elif case.get("status") in ("disabled", "notrun"):
-            yield name, "skipped", "disabled"
-        else:
+        elif skipped is None:
             yield name, "passed", ""
+        elif skipped.get("message") == "Unable to find executable":  # ctest, of what was not built
+            yield name, "failed", ""
+        else:
+            yield name, "skipped", skip_reason(case)
 
 
 def main(reports):

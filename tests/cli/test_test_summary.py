@@ -16,6 +16,7 @@ no GPU here
 [  SKIPPED ] c (0 ms)
 </system-out></testcase>
 <testcase name="d" status="disabled"><skipped message="Disabled"/></testcase>
+<testcase name="g" status="notrun"><skipped message="Unable to find executable"/></testcase>
 </testsuite>"""
 PYTEST = """<testsuites><testsuite tests="2"><testcase name="e"/>
 <testcase name="f"><skipped message="not built"/></testcase></testsuite></testsuites>"""
@@ -35,8 +36,8 @@ def reports(tmp_path):
 def test_totals_failures_and_reasons(reports):
     result = summary(f"ctest:8:{reports}/c.xml", f"pytest:0:{reports}/p.xml")
     assert result.returncode == 1
-    assert result.stdout.splitlines()[-1] == "2 passed, 1 failed, 3 skipped"
-    assert "FAILED ctest: b" in result.stdout
+    assert result.stdout.splitlines()[-1] == "2 passed, 2 failed, 3 skipped"
+    assert "FAILED ctest: b\nFAILED ctest: g\n" in result.stdout
     assert "SKIPPED (no GPU here):\n  ctest: c" in result.stdout
     assert "SKIPPED (not built):\n  pytest: f" in result.stdout
 

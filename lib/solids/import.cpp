@@ -98,8 +98,7 @@ class RigBuilder {
     return found == node_by_name_.end() ? -1 : found->second;
   }
 
-  // ---- The clip
-  // ----------------------------------------------------------------------------------------------------
+  // ---- The clip ---------------------------------------------------------------------------------
 
   double seconds(double ticks) const {
     return ticks / (animation_->mTicksPerSecond > 0 ? animation_->mTicksPerSecond : kDefaultTicksPerSecond);
@@ -165,8 +164,7 @@ class RigBuilder {
     return result;
   }
 
-  // ---- Surfaces
-  // ----------------------------------------------------------------------------------------------------
+  // ---- Surfaces ---------------------------------------------------------------------------------
 
   void add_meshes(const aiNode& node, int node_index) {
     std::map<unsigned, std::size_t> targets;  // of this node, shared by its meshes
@@ -284,8 +282,7 @@ class RigBuilder {
   std::map<std::pair<int, std::array<double, 12>>, std::int32_t> joint_index_;
 };
 
-// ---- Units
-// -----------------------------------------------------------------------------------------------------------
+// ---- Units --------------------------------------------------------------------------------------
 
 // assimp turns COLLADA files into metres, y up, by the root's transform: read the declaration back from
 // there.

@@ -1,0 +1,197 @@
+#include "solids/solid.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "core/error.h"
+#include "core/log.h"
+#include "core/timer.h"
+#include "solids/level_set_cache.h"
+#include "solids/level_set_queue.h"
+#include "solids/surface.h"
+
+namespace ringlet::solids {
+namespace {
+
+using Motion = AnimatedMesh::Motion;
+using Vertices = std::vector<Eigen::Vector3f>;
+
+constexpr double kMostVoxels = 2048;   // along the longest axis: a surface of that size is some 10^7 voxels
+constexpr double kSameInstant = 1e-6;  // of a frame
+
+Eigen::AlignedBox3d bounds_of(const std::vector<Vec3>& vertices) {
+  Eigen::AlignedBox3d box;
+  for (const Vec3& v : vertices) box.extend(v);
+  return box;
+}
+
+float voxel_size(const scene::Solid& desc, const Eigen::AlignedBox3d& bounds) {
+  const double longest = bounds.sizes().maxCoeff();
+  if (!(longest > 0)) throw Error(ErrorKind::kInput, desc.pointer, desc.name + " is a single point");
+  const double voxel = desc.voxel.value_or(longest / desc.resolution);
+  if (!(voxel > 0) || longest / voxel > kMostVoxels)
+    throw Error(
+        ErrorKind::kInput, desc.pointer,
+        fmt::format(
+            "a voxel of {:g} m for a solid {:g} m long: expected at most {} voxels along its longest axis",
+            voxel, longest, kMostVoxels),
+        "take a larger voxel");
+  return static_cast<float>(voxel);
+}
+
+void set_placement(double (&rotation)[9], double (&translation)[3], const Mat3& turn, const Vec3& shift) {
+  Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>{rotation} = turn;
+  Eigen::Map<Vec3>{translation} = shift;
+}
+
+}  // namespace
+
+struct Solid::Impl {
+  Impl(const scene::Solid& desc, const AnimatedMesh& collider, const scene::Frames& run, double first_time,
+       const std::filesystem::path& cache_directory)
+      : name(desc.name),
+        mesh(collider),
+        fps(run.fps),
+        surface(close_surface(desc.name, collider.rest_vertices(), collider.triangles())) {
+    const Eigen::AlignedBox3d bounds = bounds_of(mesh.rest_vertices());
+    origin = bounds.center();
+    options = {voxel_size(desc, bounds), desc.half_width, desc.level_set_cache.value_or(cache_directory),
+               name};
+    view.friction = static_cast<float>(desc.friction);
+    view.offset = static_cast<float>(desc.offset);
+    view.triangles = surface.triangles.front().data();
+    view.triangle_count = static_cast<std::int32_t>(surface.triangles.size());
+    if (mesh.motion() == Motion::kDeforming) {
+      queue.emplace([this](int frame) { return build_frame(frame); }, frame_of(first_time),
+                    run.last - run.first);
+      log_info(fmt::format("{}: deforms; a level set a frame, voxels of {:g} m", name, options.voxel_size));
+    } else {
+      build_once();
+    }
+  }
+
+  int frame_of(double time) const { return static_cast<int>(std::floor(time * fps + kSameInstant)); }
+
+  // Of `vertices`, the surface's, at rest or at a time: caps in place, relative to the origin.
+  Vertices local(std::vector<Vec3> vertices) const {
+    vertices.resize(surface.vertex_count());
+    surface.follow(vertices);
+    Vertices result;
+    result.reserve(vertices.size());
+    for (const Vec3& v : vertices) result.push_back((v - origin).cast<float>());
+    return result;
+  }
+
+  Vertices local_at(double time) const {
+    std::vector<Vec3> vertices(surface.vertex_count());
+    mesh.sample(time, std::span(vertices).first(mesh.vertex_count()));
+    return local(std::move(vertices));
+  }
+
+  void warn_if_empty(const LevelSet& level_set) const {
+    if (!level_set.encloses_volume())
+      log_warning(name +
+                  ": the surface encloses no volume that its voxels can see; hair will not collide with it");
+  }
+
+  // ---- Still and rigid --------------------------------------------------------------------------
+
+  void build_once() {
+    const Timer timer;
+    vertices = local(mesh.rest_vertices());
+    pair.before = pair.after = cached_level_set(surface, vertices, options);
+    log_info(fmt::format("{}: level set of {} tiles, voxels of {:g} m, {:.1f} MB, {:.2f} s", name,
+                         pair.before->distance.size() / 512, options.voxel_size, 1e-6 * pair.before->bytes(),
+                         timer.seconds()));
+    warn_if_empty(*pair.before);
+    show(pair, 0);
+    view.vertices_before = view.vertices = vertices.front().data();
+  }
+
+  void place_rigid(double time_before, double time) {
+    const Pose before = mesh.pose(time_before), after = mesh.pose(time);
+    set_placement(view.rotation_before, view.translation_before, before.rotation,
+                  before.rotation * origin + before.position);
+    set_placement(view.rotation, view.translation, after.rotation, after.rotation * origin + after.position);
+  }
+
+  // ---- Deforming --------------------------------------------------------------------------------
+
+  // On the queue's thread. A frame that looks like the last one built shares its level set.
+  std::shared_ptr<const LevelSet> build_frame(int frame) {
+    Vertices now = local_at(frame / fps);
+    if (last_built && now == last_built_vertices) return last_built;
+    const Timer timer;
+    last_built = cached_level_set(surface, now, options);
+    if (last_built_vertices.empty()) warn_if_empty(*last_built);
+    log_debug(fmt::format("{}: level set {} frames after the first, {:.1f} MB, {:.2f} s", name, frame,
+                          1e-6 * last_built->bytes(), timer.seconds()));
+    last_built_vertices = std::move(now);
+    return last_built;
+  }
+
+  void place_deforming(double time_before, double time) {
+    const int now = frame_of(time_before);
+    if (!frame || *frame != now) pair = queue->at(now);
+    frame = now;
+    show(pair, std::clamp(time * fps - now, 0.0, 1.0));
+    if (!vertices_time || *vertices_time != time_before) vertices = local_at(time_before);
+    vertices_before.swap(vertices);
+    vertices = local_at(time);
+    vertices_time = time;
+    view.vertices_before = vertices_before.front().data();
+    view.vertices = vertices.front().data();
+    set_placement(view.rotation_before, view.translation_before, Mat3::Identity(), origin);
+    set_placement(view.rotation, view.translation, Mat3::Identity(), origin);
+  }
+
+  void show(const LevelSetQueue::Pair& level_sets, double blend) {
+    view.level_set[0] = level_sets.before->view();
+    view.level_set[1] = level_sets.after->view();
+    view.blend = static_cast<float>(blend);
+  }
+
+  std::size_t bytes() const {
+    return (vertices.size() + vertices_before.size()) * sizeof(Eigen::Vector3f) +
+           surface.triangles.size() * sizeof(Triangle) + (queue ? queue->bytes() : pair.before->bytes());
+  }
+
+  const std::string name;
+  const AnimatedMesh& mesh;
+  const double fps;
+  const ClosedSurface surface;
+  Vec3 origin;  // of level-set coordinates, scene axes
+  LevelSetOptions options;
+  kernels::SolidView view{};
+  LevelSetQueue::Pair pair;
+  Vertices vertices, vertices_before;  // at the substep's end and start
+
+  std::optional<int> frame;             // whose level sets `pair` holds (deforming)
+  std::optional<double> vertices_time;  // of `vertices` (deforming)
+  Vertices last_built_vertices;         // the queue's thread alone
+  std::shared_ptr<const LevelSet> last_built;
+  std::optional<LevelSetQueue> queue;  // last: its thread uses the others
+};
+
+Solid::Solid(const scene::Solid& desc, const AnimatedMesh& mesh, const scene::Frames& frames,
+             double first_time, const std::filesystem::path& cache_directory)
+    : impl_(std::make_unique<Impl>(desc, mesh, frames, first_time, cache_directory)) {}
+Solid::~Solid() = default;
+Solid::Solid(Solid&&) noexcept = default;
+
+const std::string& Solid::name() const { return impl_->name; }
+std::size_t Solid::bytes() const { return impl_->bytes(); }
+
+const kernels::SolidView& Solid::at(double time_before, double time) {
+  if (impl_->queue) {
+    impl_->place_deforming(time_before, time);
+  } else {
+    impl_->place_rigid(time_before, time);
+  }
+  return impl_->view;
+}
+
+}  // namespace ringlet::solids

@@ -240,6 +240,7 @@ RINGLET_KERNEL void step_strands(const StrandStep<Scalar<R>>& step, int batch, i
   T* velocity = position + 3 * s.particles * stride;
   R strain = R(0), iterations = R(0), pieces = R(0);
   Mask<R> open = s.count > R(0);
+  if (!any(open)) return;  // no strands here
   for (int parts = 1; parts <= kMostPieces; parts *= 2) {
     for (int k = 0; k < 3 * s.particles; ++k) {
       store(position + k * stride, load<R>(s.position + k * kLanes));

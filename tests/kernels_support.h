@@ -1,0 +1,204 @@
+// The reference's strands stepped by the kernels, on every machine that the kernels are built for.
+#pragma once
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "kernels/launch/launch.h"
+#include "kernels/strand/strand_step.h"
+#include "oracle/ams_reference.h"
+#include "oracle/helix.h"
+#include "state/strand_model.h"
+
+namespace ringlet::kernels_testing {
+
+using oracle::RootPose;
+
+// A machine is a precision and the kernels for it. The scalar ones take the same source a strand at a time.
+template <class Real>
+struct ScalarMachine {
+  using T = Real;
+  static constexpr bool kFused = true;  // multiply-adds round once: bits are those of every fused machine
+  static std::string name() { return "scalar"; }
+  static bool available() { return true; }
+  static const kernels::KernelTable<T>& kernels() {
+    static const kernels::KernelTable<T> table = {
+        [](const kernels::StrandStep<T>& step, int begin, int end, T* scratch) {
+          for (int batch = begin; batch < end; ++batch)
+            for (int lane = 0; lane < kernels::kLanes; ++lane)
+              kernels::step_strands<T>(step, batch, lane, scratch, 1);
+        },
+        [](const kernels::ContactStep<T>& step, int begin, int end, T* scratch) {
+          for (int batch = begin; batch < end; ++batch)
+            for (int lane = 0; lane < kernels::kLanes; ++lane)
+              kernels::collide_strands<T>(step, batch, lane, scratch, 1);
+        }};
+    return table;
+  }
+};
+
+template <class Real, kernels::InstructionSet kSet>
+struct PackMachine {
+  using T = Real;
+  static constexpr bool kFused = kSet != kernels::InstructionSet::kGeneric;
+  static std::string name() { return kernels::name_of(kSet); }
+  static bool available() { return kernels::best_instruction_set() >= kSet; }
+  static const kernels::KernelTable<T>& kernels() { return kernels::cpu_kernels<T>(kSet); }
+};
+
+template <class T>
+using MachinesOf = testing::Types<ScalarMachine<T>, PackMachine<T, kernels::InstructionSet::kGeneric>,
+                                  PackMachine<T, kernels::InstructionSet::kAvx2>,
+                                  PackMachine<T, kernels::InstructionSet::kAvx512>>;
+using Machines = testing::Types<ScalarMachine<double>, PackMachine<double, kernels::InstructionSet::kGeneric>,
+                                PackMachine<double, kernels::InstructionSet::kAvx2>,
+                                PackMachine<double, kernels::InstructionSet::kAvx512>, ScalarMachine<float>,
+                                PackMachine<float, kernels::InstructionSet::kGeneric>,
+                                PackMachine<float, kernels::InstructionSet::kAvx2>,
+                                PackMachine<float, kernels::InstructionSet::kAvx512>>;
+
+struct MachineNames {
+  template <class Machine>
+  static std::string GetName(int) {
+    return Machine::name() + (std::is_same_v<typename Machine::T, double> ? "_double" : "_float");
+  }
+};
+
+// A fixture that reports SKIPPED where this processor lacks the machine.
+template <class Machine>
+class OnMachine : public testing::Test {
+ protected:
+  using T = typename Machine::T;
+  static constexpr bool kDouble = std::is_same_v<T, double>;
+
+  // The tolerance in the machine's precision.
+  static constexpr double either(double in_double, double in_float) { return kDouble ? in_double : in_float; }
+  void SetUp() override {
+    if (!Machine::available()) GTEST_SKIP() << "this processor has no " << Machine::name();
+  }
+};
+
+// The strand as a model of precision T holds it: rest shape and options rounded to T, stiffness to float.
+template <class T>
+oracle::Strand rounded(oracle::Strand strand) {
+  strand.rest = strand.rest.template cast<T>().template cast<double>();
+  for (auto* stiffness : {&strand.edge, &strand.bend, &strand.twist, &strand.integrity, &strand.angular})
+    for (double& value : *stiffness) value = static_cast<float>(value);
+  strand.gravity = strand.gravity.template cast<T>().template cast<double>();
+  strand.drag = static_cast<T>(strand.drag), strand.damping = static_cast<T>(strand.damping);
+  return strand;
+}
+
+// Strands of unit mass and their state. The options of the first strand (gravity, drag, damping, clamped
+// particles, tangents) hold for all; lengths are left alone until `parameters` says otherwise.
+template <class Machine>
+class StrandRun {
+ public:
+  using T = typename Machine::T;
+
+  // At rest on the ghosts of `poses`, which the preload (if any) is taken against.
+  StrandRun(const std::vector<oracle::Strand>& strands, std::vector<RootPose> poses, bool preload)
+      : model(input_of(strands, poses, preload)), state(model.layout), poses_(std::move(poses)) {
+    const oracle::Strand& first = strands.front();
+    parameters.gravity[0] = static_cast<T>(first.gravity.x());
+    parameters.gravity[1] = static_cast<T>(first.gravity.y());
+    parameters.gravity[2] = static_cast<T>(first.gravity.z());
+    parameters.drag = static_cast<T>(first.drag), parameters.damping = static_cast<T>(first.damping);
+    parameters.geometric_stiffness = first.geometric_stiffness ? T(1) : T(0);
+    parameters.consistent_angular = first.angular_tangent == oracle::AngularTangent::kConsistent;
+    parameters.exact_integrity = first.integrity_tangent == oracle::IntegrityTangent::kExact;
+    parameters.clamped = first.clamped;
+    parameters.length_tolerance = T(1e-4);
+    parameters.strain_limit = parameters.speed_limit = T(1e9);
+    std::vector<Pose> at;
+    for (const RootPose& pose : poses_) at.push_back({pose.rotation, pose.root});
+    state::pose_at_rest<T>(state, model, at);
+    figures.assign(static_cast<std::size_t>(model.layout.batches()) * kernels::kFigures * kernels::kLanes,
+                   T(0));
+    scratch.assign(kernels::scratch_reals(model.layout.longest()), T(0));
+  }
+
+  void set(std::size_t strand, const oracle::State& values) {
+    const oracle::Points x = values.position.colwise() - poses_[strand].root;
+    for (int i = 0; i < model.layout.count(strand); ++i)
+      for (int c = 0; c < 3; ++c) {
+        const std::size_t at = model.layout.at(strand, i, 3, c);
+        state.position[at] = static_cast<T>(x(c, i));
+        state.velocity[at] = static_cast<T>(values.velocity(c, i));
+      }
+  }
+
+  oracle::State get(std::size_t strand) const {
+    const int n = model.layout.count(strand);
+    oracle::State values{oracle::Points(3, n), oracle::Points(3, n)};
+    for (int i = 0; i < n; ++i)
+      for (int c = 0; c < 3; ++c) {
+        const std::size_t at = model.layout.at(strand, i, 3, c);
+        values.position(c, i) = state.position[at], values.velocity(c, i) = state.velocity[at];
+      }
+    values.position.colwise() += poses_[strand].root;
+    return values;
+  }
+
+  // One substep to the given root poses, `at_a_time` batches a call (0: all in one).
+  void step(const std::vector<RootPose>& after, double h, int at_a_time = 0) {
+    for (std::size_t strand = 0; strand < poses_.size(); ++strand)
+      state::set_root_motion<T>(state, model.layout, strand, {poses_[strand].rotation, poses_[strand].root},
+                                {after[strand].rotation, after[strand].root});
+    parameters.step = static_cast<T>(h);
+    const kernels::StrandStep<T> step{model.view(), state.view(), state.root_motion.data(), parameters,
+                                      figures.data()};
+    const int batches = model.layout.batches(), piece = at_a_time > 0 ? at_a_time : batches;
+    for (int begin = 0; begin < batches; begin += piece)
+      Machine::kernels().strand_step(step, begin, std::min(begin + piece, batches), scratch.data());
+    poses_ = after;
+  }
+
+  double figure(std::size_t strand, kernels::StrandFigure which) const {
+    return figures[model.layout.at_strand(strand, kernels::kFigures, which)];
+  }
+
+  state::StrandModel<T> model;
+  state::StrandState<T> state;
+  kernels::StrandParameters<T> parameters{};
+  state::AlignedVector<T> figures, scratch;
+
+ private:
+  static state::StrandInput input_of(const std::vector<oracle::Strand>& strands,
+                                     const std::vector<RootPose>& poses, bool preload) {
+    state::StrandInput input;
+    const auto or_zero = [](const std::vector<double>& values, int i) {
+      return i < static_cast<int>(values.size()) ? static_cast<float>(values[i]) : 0.0f;
+    };
+    for (std::size_t k = 0; k < strands.size(); ++k) {
+      const oracle::Strand& s = strands[k];
+      input.counts.push_back(s.size());
+      input.first_rotation.push_back(poses[k].rotation);
+      for (int i = 0; i < s.size(); ++i) {
+        input.rest.push_back(s.rest.col(i));
+        for (const auto* values : {&s.edge, &s.bend, &s.twist, &s.integrity, &s.angular})
+          input.stiffness.push_back(or_zero(*values, i));
+      }
+    }
+    if (preload) input.preload = strands.front().gravity;
+    return input;
+  }
+
+  std::vector<RootPose> poses_;
+};
+
+// One strand through `steps` of the helix's steps by the kernels.
+template <class Machine>
+oracle::HelixOutcome run_helix_on(StrandRun<Machine>& run, const oracle::Strand& strand,
+                                  const oracle::Shake& shake, int steps, int substeps) {
+  return oracle::run_helix(strand, shake, steps, substeps,
+                           [&](const oracle::Strand&, const oracle::State&, const oracle::Step& step) {
+                             run.step({step.after}, step.h);
+                             return run.get(0);
+                           });
+}
+
+}  // namespace ringlet::kernels_testing

@@ -2,11 +2,17 @@
 
 namespace ringlet::groom {
 
-Mat3 up_rotation(scene::Axis from, scene::Axis to) {
-  if (from == to) return Mat3::Identity();
-  const Vec3 source = Vec3::Unit(static_cast<int>(from)), target = Vec3::Unit(static_cast<int>(to));
-  const Vec3 axis = source.cross(target);
-  return axis * axis.transpose() + target * source.transpose() - source * target.transpose();
+namespace {
+// Rows are the y-up axes in axes with `up` up.
+Mat3 to_y_up(scene::Axis up) {
+  const Vec3 x = Vec3::UnitX(), y = Vec3::UnitY(), z = Vec3::UnitZ();
+  Mat3 turn = Mat3::Identity();
+  if (up == scene::Axis::kX) turn.transpose() << -y, x, z;
+  if (up == scene::Axis::kZ) turn.transpose() << x, z, -y;
+  return turn;
 }
+}  // namespace
+
+Mat3 up_rotation(scene::Axis from, scene::Axis to) { return to_y_up(to).transpose() * to_y_up(from); }
 
 }  // namespace ringlet::groom

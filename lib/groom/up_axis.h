@@ -5,8 +5,9 @@
 
 namespace ringlet::groom {
 
-// The shortest rotation that takes axis `from` to axis `to`: a quarter turn about the third axis, exact in
-// floating point. y to z gives (x, y, z) -> (x, -z, y), as exchanging files with a z-up program does.
+// Turns axes with `from` up into axes with `to` up, exactly: x to y a quarter turn about z, y to z about x,
+// the other pairs by way of y, so that turning twice is turning once. Heads are turned alike: a groom keeps
+// to its head.
 Mat3 up_rotation(scene::Axis from, scene::Axis to);
 
 }  // namespace ringlet::groom

@@ -110,8 +110,8 @@ TEST(GroomRead, UpAxisTurnsIntoTheScenes) {
   EXPECT_EQ(first(kZ, kY), Vec3(1, 3, -2));
   EXPECT_EQ(first(kX, kY), Vec3(-2, 1, 3));
   EXPECT_EQ(first(kY, kX), Vec3(2, -1, 3));
-  EXPECT_EQ(first(kZ, kX), Vec3(3, 2, -1));
-  EXPECT_EQ(first(kX, kZ), Vec3(-3, 2, 1));
+  EXPECT_EQ(first(kZ, kX), Vec3(3, -1, -2));
+  EXPECT_EQ(first(kX, kZ), Vec3(-2, -3, 1));
 }
 
 TEST(GroomRead, ScenesUnitIsTheFallback) {

@@ -331,8 +331,9 @@ void write_sequence(const h5::Object& root, const std::map<int, FrameRecord>& fr
     const auto first =
         std::find_if(frames.begin(), frames.end(), [&](const auto& f) { return has(f.second); });
     if (first == frames.end()) continue;
-    write_field(root.group(surface_path(i)), "vertices", "/" + surface_path(i) + "/vertices",
-                {first->second.vertices[i], 3}, frames, files, has);
+    write_field(root.group(surface_path(i)), "vertices",
+                std::string("/").append(surface_path(i)).append("/vertices"), {first->second.vertices[i], 3},
+                frames, files, has);
   }
 }
 

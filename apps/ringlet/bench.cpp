@@ -1,0 +1,204 @@
+#include "bench.h"
+
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+#include <tbb/info.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "core/timer.h"
+#include "effects/executor.h"
+#include "kernels/launch/launch.h"
+#include "scene/scene.h"
+
+namespace ringlet::app {
+namespace {
+
+using Row = nlohmann::ordered_json;
+
+std::string processor() {
+  std::ifstream info("/proc/cpuinfo");
+  for (std::string line; std::getline(info, line);)
+    if (line.starts_with("model name")) return line.substr(line.find(':') + 2);
+  return "unknown processor";
+}
+
+double median(std::vector<double> values) {
+  std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
+  return values[values.size() / 2];
+}
+
+// ---- The strand step alone
+// ----------------------------------------------------------------------------------------
+
+// As many strands and particles as the AMS paper's "Digital Grooming" asset: helices of 21 particles, 25 cm
+// long.
+constexpr int kStrands = 7905, kParticles = 21;
+
+state::StrandInput helices() {
+  state::StrandInput input;
+  input.counts.assign(kStrands, kParticles);
+  for (int s = 0; s < kStrands; ++s) {
+    for (int i = 0; i < kParticles; ++i) {
+      const double t = i / (kParticles - 1.0), a = 6 * std::numbers::pi * t + s;
+      input.rest.emplace_back(0.02 * std::cos(a), -0.2 * t, 0.02 * std::sin(a));
+    }
+  }
+  input.first_rotation.assign(kStrands, Mat3::Identity());
+  input.preload = Vec3(0, -9.81, 0);
+  return input;
+}
+
+kernels::StrandParameters<float> parameters(double step) {
+  kernels::StrandParameters<float> p{};
+  p.step = static_cast<float>(step);
+  p.gravity[1] = -9.81f;
+  for (const int k : {kernels::kEdge, kernels::kBend, kernels::kTwist}) p.stiffness[k] = 1e6f;
+  for (const int k : {kernels::kIntegrity, kernels::kAngular}) p.stiffness[k] = 1e2f;
+  p.damping = 1.0f / 60, p.geometric_stiffness = 1;
+  p.consistent_angular = p.exact_integrity = true;
+  p.clamped = 1;
+  p.length_iterations = 8, p.length_tolerance = 1e-4f;
+  p.strain_limit = 1e3f, p.speed_limit = 1e3f;
+  return p;
+}
+
+// A shaken wig, the head swinging 5 cm at 1 Hz: forces, factor, solve, advance and the length projection it
+// needs.
+Row strand_row(const std::string& instruction_set, int threads, int repeats) {
+  const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+  const state::StrandModel<float> model(helices());
+  state::StrandState<float> state(model.layout);
+  std::vector<Pose> before(kStrands), after(kStrands);
+  state::pose_at_rest<float>(state, model, before);
+  const auto executor = effects::make_cpu_executor<float>(model, instruction_set);
+  state::AlignedVector<float> figures(static_cast<std::size_t>(model.layout.batches()) * kernels::kFigures *
+                                      kernels::kLanes);
+  constexpr double kStep = 1.0 / 192;  // 24 frames a second, 8 substeps
+  constexpr int kWarm = 24, kTimed = 32;
+  const kernels::StrandStep<float> step{model.view(), state.view(), state.root_motion.data(),
+                                        parameters(kStep), figures.data()};
+  std::vector<double> nanoseconds;
+  double iterations = 0;
+  const auto advance = [&](int n) {
+    const auto height = [](int k) { return 0.05 * (1 - std::cos(2 * std::numbers::pi * k * kStep)); };
+    for (int s = 0; s < kStrands; ++s) {
+      before[s].position.z() = height(n), after[s].position.z() = height(n + 1);
+      state::set_root_motion(state, model.layout, s, before[s], after[s]);
+    }
+    const Timer timer;
+    executor->strand_step(step);
+    return timer.seconds();
+  };
+  int n = 0;
+  for (; n < kWarm; ++n) advance(n);
+  const auto position = state.position, velocity = state.velocity;
+  for (int repeat = 0; repeat < repeats; ++repeat) {
+    state.position = position, state.velocity = velocity;  // every repeat does the same work
+    double seconds = 0;
+    iterations = 0;
+    for (int k = 0; k < kTimed; ++k) {
+      seconds += advance(n + k);
+      for (int s = 0; s < kStrands; ++s)
+        iterations += figures[model.layout.at_strand(s, kernels::kFigures, kernels::kIterations)];
+    }
+    nanoseconds.push_back(1e9 * seconds * threads / (static_cast<double>(kTimed) * kStrands * kParticles));
+  }
+  return {{"row", "strand step"},
+          {"instruction_set", instruction_set},
+          {"threads", threads},
+          {"strands", kStrands},
+          {"particles", kStrands * kParticles},
+          {"projection_iterations", iterations / (static_cast<double>(kTimed) * kStrands)},
+          {"ns_per_particle_substep_core", median(nanoseconds)},
+          {"ms_per_substep", 1e-6 * median(nanoseconds) * kStrands * kParticles / threads}};
+}
+
+// ---- Whole scenes
+// -------------------------------------------------------------------------------------------------
+
+class Discard : public state::FrameSink {
+  void write(state::Frame, state::Snapshot, double) override {}
+  void finish() override {}
+};
+
+Row scene_row(const std::string& file, const BenchOptions& options) {
+  const Timer load_timer;
+  const scene::Scene scene = scene::load(file);
+  const auto simulation = pipeline::Simulation::create(scene, options.options);
+  const double load_seconds = load_timer.seconds();
+  std::vector<double> frames;
+  std::vector<std::pair<std::string, std::vector<double>>> stages;
+  pipeline::RunControl control;
+  control.on_frame = [&](int, double seconds, const pipeline::StageSeconds& parts) {
+    frames.push_back(seconds);
+    if (stages.empty())
+      for (const auto& [name, spent] : parts) stages.push_back({name, {}});
+    for (std::size_t k = 0; k < parts.size(); ++k) stages[k].second.push_back(parts[k].second);
+  };
+  Discard sink;
+  simulation->run({scene.frames.first, scene.frames.last}, sink, control);
+  const pipeline::Plan& plan = simulation->plan();
+  Row row = {{"row", scene.name},
+             {"strands", plan.strands},
+             {"particles", plan.particles},
+             {"substeps", plan.substeps},
+             {"ms_per_frame", 1e3 * median(frames)},
+             {"load_seconds", load_seconds}};
+  for (const auto& [name, seconds] : stages) row["stages_ms"][name] = 1e3 * median(seconds);
+  return row;
+}
+
+void print_table(const std::vector<Row>& rows) {
+  fmt::print("{:<24} {:>8} {:>9} {:>8} {:>12} {:>22} {:>12}\n", "row", "strands", "particles", "threads",
+             "ms", "ns/particle/substep/core", "");
+  for (const Row& row : rows) {
+    if (row.contains("ns_per_particle_substep_core")) {
+      fmt::print("{:<24} {:>8} {:>9} {:>8} {:>12.2f} {:>22.1f} {:>12}\n",
+                 row["row"].get<std::string>() + " " + row["instruction_set"].get<std::string>(),
+                 row["strands"].get<int>(), row["particles"].get<int>(), row["threads"].get<int>(),
+                 row["ms_per_substep"].get<double>(), row["ns_per_particle_substep_core"].get<double>(),
+                 fmt::format("{:.2f} projections", row["projection_iterations"].get<double>()));
+    } else {
+      std::string stages;
+      for (const auto& [name, ms] : row["stages_ms"].items())
+        stages += fmt::format("{} {:.1f}  ", name, ms.get<double>());
+      fmt::print("{:<24} {:>8} {:>9} {:>8} {:>12.1f} a frame: {}\n", row["row"].get<std::string>(),
+                 row["strands"].get<int>(), row["particles"].get<int>(), "",
+                 row["ms_per_frame"].get<double>(), stages);
+    }
+  }
+}
+
+}  // namespace
+
+int run_bench(const BenchOptions& options) {
+  const int cores = tbb::info::default_concurrency();
+  const int threads = options.threads > 0 ? options.threads : cores;
+  std::vector<Row> rows;
+  for (const auto set : {kernels::InstructionSet::kGeneric, kernels::InstructionSet::kAvx2,
+                         kernels::InstructionSet::kAvx512}) {
+    const std::string name = kernels::name_of(set);
+    if (set > kernels::best_instruction_set()) continue;
+    if (!options.options.instruction_set.empty() && options.options.instruction_set != name) continue;
+    rows.push_back(strand_row(name, 1, options.repeats));
+    if (threads > 1) rows.push_back(strand_row(name, threads, options.repeats));
+  }
+  {
+    const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+    for (const std::string& file : options.scenes) rows.push_back(scene_row(file, options));
+  }
+  if (options.json) {
+    fmt::print("{}\n", Row({{"processor", processor()}, {"cores", cores}, {"rows", rows}}).dump(2));
+  } else {
+    fmt::print("{}, {} cores\n", processor(), cores);
+    print_table(rows);
+  }
+  return 0;
+}
+
+}  // namespace ringlet::app

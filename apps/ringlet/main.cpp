@@ -1,0 +1,198 @@
+// The command line. Errors leave here as `error: WHERE: WHAT (HINT)` on stderr and an exit code
+// (core/error.h).
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <new>
+
+#include "bench.h"
+#include "compare.h"
+#include "core/log.h"
+#include "groom.h"
+#include "info.h"
+#include "plan.h"
+#include "run.h"
+#include "scene/scene.h"
+
+namespace ringlet::app {
+namespace {
+
+using Job = std::function<int()>;
+
+template <class Enum>
+CLI::CheckedTransformer words(std::map<std::string, Enum> values) {
+  return CLI::CheckedTransformer(std::move(values), CLI::ignore_case);
+}
+
+void add_machine(CLI::App& command, pipeline::Options& options, int& threads) {
+  using pipeline::Backend, pipeline::Precision;
+  command.add_option("--backend", options.backend, "auto, cpu or cuda")
+      ->transform(
+          words<Backend>({{"auto", Backend::kAuto}, {"cpu", Backend::kCpu}, {"cuda", Backend::kCuda}}))
+      ->option_text("auto/cpu/cuda");
+  command.add_option("--precision", options.precision, "float or double")
+      ->transform(words<Precision>({{"float", Precision::kFloat}, {"double", Precision::kDouble}}))
+      ->option_text("float/double");
+  command
+      .add_option("--instruction-set", options.instruction_set, "of the CPU; the widest there is by default")
+      ->check(CLI::IsMember({"generic", "avx2", "avx512"}))
+      ->option_text("generic/avx2/avx512");
+  command.add_option("--threads", threads, "CPU threads; all by default")
+      ->check(CLI::Range(1, 4096))
+      ->option_text("N");
+}
+
+void add_scene(CLI::App& command, std::string& file, std::vector<std::string>& overrides) {
+  command.add_option("SCENE", file, "scene file (JSON)")->required();
+  command.add_option("--set", overrides, "change a value of the scene; null removes; repeatable")
+      ->allow_extra_args(false)
+      ->option_text("POINTER=JSON");
+}
+
+void add_run(CLI::App& app, Job& job) {
+  CLI::App* command = app.add_subcommand("run", "simulate a scene and write its cache");
+  const auto options = std::make_shared<RunOptions>();
+  add_scene(*command, options->scene.file, options->scene.overrides);
+  add_machine(*command, options->scene.options, options->scene.threads);
+  command->add_option("-o,--output", options->output, "directory of the cache; out/NAME by default")
+      ->option_text("DIR");
+  command->add_option("--frames", options->frames, "frames to write")->option_text("A-B");
+  CLI::Option* resume = command->add_flag("--resume", options->resume, "go on from the last complete frame");
+  command->add_flag("--overwrite", options->overwrite, "replace a cache that is there")->excludes(resume);
+  command->add_option("--progress", options->progress, "how to tell how far it is")
+      ->check(CLI::IsMember({"auto", "bar", "plain", "json", "none"}))
+      ->option_text("auto/bar/plain/json/none");
+  command->callback([options, &job] { job = [options] { return run_run(*options); }; });
+}
+
+void add_plan(CLI::App& app, Job& job) {
+  CLI::App* command = app.add_subcommand("plan", "what would run: stages, memory, launches");
+  const auto options = std::make_shared<PlanOptions>();
+  add_scene(*command, options->scene.file, options->scene.overrides);
+  add_machine(*command, options->scene.options, options->scene.threads);
+  command->add_flag("--json", options->json, "as JSON");
+  command->callback([options, &job] { job = [options] { return run_plan(*options); }; });
+}
+
+void add_validate(CLI::App& app, Job& job) {
+  CLI::App* command = app.add_subcommand("validate", "check a scene; every error at once");
+  const auto settings = std::make_shared<SceneSettings>();
+  add_scene(*command, settings->file, settings->overrides);
+  command->callback([settings, &job] {
+    job = [settings] {
+      const scene::Scene scene = scene::load(settings->file, {settings->overrides});
+      fmt::print("{}: valid (scene `{}`, {})\n", settings->file, scene.name, scene.hash);
+      return 0;
+    };
+  });
+}
+
+void add_info(CLI::App& app, Job& job) {
+  CLI::App* command = app.add_subcommand("info", "what a cache, groom, mesh or scene holds");
+  const auto options = std::make_shared<InfoOptions>();
+  command->add_option("FILE", options->file, "cache, groom, mesh or scene")->required();
+  command->add_option("--strand", options->strand, "one strand's points and length")->option_text("N");
+  command->add_flag("--json", options->json, "as JSON");
+  command->callback([options, &job] { job = [options] { return run_info(*options); }; });
+}
+
+void add_compare(CLI::App& app, Job& job) {
+  CLI::App* command =
+      app.add_subcommand("compare", "compare two caches frame by frame; exit 1 where they differ");
+  const auto options = std::make_shared<CompareOptions>();
+  command->add_option("A", options->a, "cache")->required();
+  command->add_option("B", options->b, "cache")->required();
+  CLI::Option* tolerance =
+      command
+          ->add_option("--tolerance", options->tolerance, "largest distance allowed, in A's unit of length")
+          ->check(CLI::NonNegativeNumber)
+          ->option_text("D");
+  command->add_flag("--exact", options->exact, "the same bits")->excludes(tolerance);
+  command->add_flag("--json", options->json, "as JSON");
+  command->callback([options, &job] { job = [options] { return run_compare(*options); }; });
+}
+
+void add_groom(CLI::App& app, Job& job) {
+  CLI::App* group = app.add_subcommand("groom", "grow and convert grooms");
+  group->require_subcommand(1);
+  CLI::App* grow = group->add_subcommand("grow", "grow a scene's procedural groom into a groom file");
+  const auto growing = std::make_shared<GroomGrowOptions>();
+  add_scene(*grow, growing->scene, growing->overrides);
+  grow->add_option("--groom", growing->groom, "which groom of the scene")->option_text("NAME");
+  grow->add_option("-o,--output", growing->output, "groom file to write (.h5)")
+      ->required()
+      ->option_text("FILE");
+  grow->callback([growing, &job] { job = [growing] { return run_groom_grow(*growing); }; });
+
+  CLI::App* convert = group->add_subcommand("convert", "read any groom and write it as Ringlet's own");
+  const auto converting = std::make_shared<GroomConvertOptions>();
+  convert->add_option("INPUT", converting->input, ".hair, .data, .tfx or .h5")->required();
+  convert->add_option("--skin", converting->skin, ".tfxskin with the stored roots")->option_text("FILE");
+  convert
+      ->add_option("--unit", converting->unit,
+                   "of the input where it declares none: m, cm, mm, in, ft or metres")
+      ->option_text("UNIT");
+  convert->add_option("--up", converting->up, "up axis of the input where it declares none")
+      ->option_text("x/y/z");
+  convert->add_option("-o,--output", converting->output, "groom file to write (.h5)")
+      ->required()
+      ->option_text("FILE");
+  convert->callback([converting, &job] { job = [converting] { return run_groom_convert(*converting); }; });
+}
+
+void add_bench(CLI::App& app, Job& job) {
+  CLI::App* command = app.add_subcommand("bench", "time the strand step, and whole scenes by stage");
+  const auto options = std::make_shared<BenchOptions>();
+  command->add_option("SCENES", options->scenes, "scene files to time as well");
+  add_machine(*command, options->options, options->threads);
+  command->add_option("--repeats", options->repeats, "of each timing; the median is told")
+      ->check(CLI::Range(1, 1000));
+  command->add_flag("--json", options->json, "as JSON");
+  command->callback([options, &job] { job = [options] { return run_bench(*options); }; });
+}
+
+int report(const Error& error) {
+  for (const Problem& problem : error.problems()) fmt::print(stderr, "error: {}\n", to_string(problem));
+  return static_cast<int>(error.kind());
+}
+
+int main(int argc, char** argv) {
+  CLI::App app("Ringlet simulates hair: a scene in, a strand cache out.", "ringlet");
+  app.set_version_flag("--version", RINGLET_VERSION);
+  app.require_subcommand(1);
+  bool quiet = false, verbose = false;
+  app.add_flag("-q,--quiet", quiet, "warnings only");
+  app.add_flag("-v,--verbose", verbose, "more of what is done");
+  Job job;
+  add_run(app, job);
+  add_plan(app, job);
+  add_validate(app, job);
+  add_info(app, job);
+  add_compare(app, job);
+  add_groom(app, job);
+  add_bench(app, job);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    const bool asked = error.get_exit_code() == 0;  // --help, --version
+    if (asked) return app.exit(error);
+    fmt::print(stderr, "error: command line: {} (see `ringlet --help`)\n", error.what());
+    return static_cast<int>(ErrorKind::kUsage);
+  }
+  set_log_level(verbose ? LogLevel::kDebug : quiet ? LogLevel::kWarning : LogLevel::kInfo);
+  try {
+    return job();
+  } catch (const Error& error) {
+    return report(error);
+  } catch (const std::bad_alloc&) {
+    return report(Error(ErrorKind::kIo, "memory", "not enough memory for this scene", "see `ringlet plan`"));
+  } catch (const std::exception& error) {
+    return report(Error(ErrorKind::kIo, "", error.what()));
+  }
+}
+
+}  // namespace
+}  // namespace ringlet::app
+
+int main(int argc, char** argv) { return ringlet::app::main(argc, argv); }

@@ -1,0 +1,54 @@
+#include "plan.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "scene/scene.h"
+
+namespace ringlet::app {
+namespace {
+
+void print_json(const scene::Scene& scene, const pipeline::Plan& plan) {
+  nlohmann::ordered_json out = {{"scene", scene.name},
+                                {"strands", plan.strands},
+                                {"particles", plan.particles},
+                                {"substeps", plan.substeps},
+                                {"frames", plan.frames},
+                                {"stages", nlohmann::json::array()},
+                                {"absent", nlohmann::json::array()}};
+  for (const pipeline::PlannedStage& stage : plan.stages) {
+    if (stage.runs)
+      out["stages"].push_back({{"name", stage.name}, {"bytes", stage.bytes}, {"launches", stage.launches}});
+    else
+      out["absent"].push_back(stage.name);
+  }
+  fmt::print("{}\n", out.dump(2));
+}
+
+void print_table(const scene::Scene& scene, const pipeline::Plan& plan) {
+  fmt::print("scene {}: {} strands, {} particles, {} frames of {} substeps\n", scene.name, plan.strands,
+             plan.particles, plan.frames, plan.substeps);
+  fmt::print("  {:<10} {:>12} {:>12}  {}\n", "stage", "MB", "launches", "what");
+  for (const pipeline::PlannedStage& stage : plan.stages) {
+    if (stage.runs)
+      fmt::print("  {:<10} {:>12.1f} {:>12}  {}\n", stage.name, 1e-6 * static_cast<double>(stage.bytes),
+                 stage.launches, stage.what);
+    else
+      fmt::print("  {:<10} {:>12} {:>12}  {}\n", stage.name, "-", "-", "not in this scene");
+  }
+}
+
+}  // namespace
+
+int run_plan(const PlanOptions& options) {
+  const scene::Scene scene = scene::load(options.scene.file, {options.scene.overrides});
+  const auto simulation = pipeline::Simulation::create(scene, options.scene.options);
+  if (options.json)
+    print_json(scene, simulation->plan());
+  else
+    print_table(scene, simulation->plan());
+  return 0;
+}
+
+}  // namespace ringlet::app

@@ -63,6 +63,7 @@ struct Solid::Impl {
     view.friction = static_cast<float>(desc.friction);
     view.offset = static_cast<float>(desc.offset);
     view.triangles = surface.triangles.front().data();
+    view.neighbours = surface.neighbours.data();
     view.triangle_count = static_cast<std::int32_t>(surface.triangles.size());
     if (mesh.motion() == Motion::kDeforming) {
       queue.emplace([this](int frame) { return build_frame(frame); }, frame_of(first_time),

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <numbers>
 #include <numeric>
 #include <unordered_map>
@@ -16,6 +17,29 @@ bool is_degenerate(const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t
 
 const Vec3& at(std::span<const Vec3> vertices, std::int32_t v) {
   return vertices[static_cast<std::size_t>(v)];
+}
+
+// Meshes that meet (a scalp and a face, an eye and its lid) are one surface: vertices at the same place at rest count as
+// the first of them. Which moved part a seam then follows does not matter, as long as it stays closed.
+std::vector<Triangle> join_seams(std::span<const Vec3> vertices, std::span<const Triangle> mesh) {
+  struct Hash {
+    std::size_t operator()(const std::array<double, 3>& p) const {
+      std::size_t h = 0;
+      for (const double x : p) h = h * 1000003 + std::hash<double>{}(x);
+      return h;
+    }
+  };
+  std::unordered_map<std::array<double, 3>, std::int32_t, Hash> first;
+  first.reserve(vertices.size());
+  std::vector<std::int32_t> same(vertices.size());
+  for (std::size_t v = 0; v < vertices.size(); ++v) {
+    const Vec3& x = vertices[v];
+    same[v] = first.try_emplace({x.x() + 0.0, x.y() + 0.0, x.z() + 0.0}, static_cast<std::int32_t>(v)).first->second;
+  }
+  std::vector<Triangle> joined(mesh.begin(), mesh.end());
+  for (Triangle& t : joined)
+    for (std::int32_t& v : t) v = same[static_cast<std::size_t>(v)];
+  return joined;
 }
 
 // A boundary edge in the direction of the triangle that has it: its cap's triangle runs the other way.
@@ -82,6 +106,32 @@ std::vector<std::vector<Edge>> find_loops(const std::vector<Edge>& edges) {
     }
   }
   return loops;
+}
+
+// Across each triangle's edges, corner k to k + 1: the other triangle there; -1 where there is none, or more than one.
+std::vector<std::int32_t> find_neighbours(const std::vector<Triangle>& triangles) {
+  struct Uses {
+    std::int32_t side[2] = {-1, -1};  // 3 * triangle + edge
+    int count = 0;
+  };
+  std::unordered_map<std::uint64_t, Uses> edges;
+  edges.reserve(2 * triangles.size());
+  std::vector<std::int32_t> result(3 * triangles.size(), -1);
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    if (is_degenerate(triangles[t])) continue;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const std::int32_t a = triangles[t][c], b = triangles[t][(c + 1) % 3];
+      Uses& uses = edges[static_cast<std::uint64_t>(std::min(a, b)) << 32 | static_cast<std::uint32_t>(std::max(a, b))];
+      if (uses.count < 2) uses.side[uses.count] = static_cast<std::int32_t>(3 * t + c);
+      ++uses.count;
+    }
+  }
+  for (const auto& [edge, uses] : edges) {
+    if (uses.count != 2) continue;
+    result[static_cast<std::size_t>(uses.side[0])] = uses.side[1] / 3;
+    result[static_cast<std::size_t>(uses.side[1])] = uses.side[0] / 3;
+  }
+  return result;
 }
 
 void cap(ClosedSurface& surface, const std::vector<Edge>& loop) {
@@ -193,9 +243,9 @@ void ClosedSurface::follow(std::span<Vec3> vertices) const {
 ClosedSurface close_surface(const std::string& name, std::span<const Vec3> vertices,
                             std::span<const Triangle> mesh) {
   ClosedSurface surface;
-  surface.triangles.assign(mesh.begin(), mesh.end());
+  surface.triangles = join_seams(vertices, mesh);
   surface.mesh_vertices = vertices.size();
-  const std::vector<Edge> edges = boundary_edges(mesh);
+  const std::vector<Edge> edges = boundary_edges(surface.triangles);
   for (const std::vector<Edge>& loop : find_loops(edges)) cap(surface, loop);
   if (!edges.empty())
     log_info(fmt::format("{}: the surface is open; {} boundary loops of {} edges in all have been capped",
@@ -204,6 +254,7 @@ ClosedSurface close_surface(const std::string& name, std::span<const Vec3> verti
   all.resize(surface.vertex_count());
   surface.follow(all);
   orient_parts(surface, all, name);
+  surface.neighbours = find_neighbours(surface.triangles);
   return surface;
 }
 

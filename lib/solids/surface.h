@@ -9,11 +9,12 @@
 namespace ringlet::solids {
 
 struct ClosedSurface {
-  std::vector<Triangle> triangles;  // the mesh's own, in their order (some turned round), then the caps'
+  std::vector<Triangle> triangles;  // the mesh's own, in their order (seams joined, some turned), then the caps'
   std::vector<bool>
       bounds_cavity;  // [triangles] of a part that lies inside another and faces inward: a hollow's wall
   std::vector<std::vector<std::int32_t>>
       loops;  // the boundary loops capped; loop i's centre is vertex mesh_vertices + i
+  std::vector<std::int32_t> neighbours;  // [triangles * 3] across the edge from corner k to k + 1, -1: none
   std::size_t mesh_vertices = 0;
 
   std::size_t vertex_count() const { return mesh_vertices + loops.size(); }

@@ -12,7 +12,9 @@ constexpr int kDevice = 0;       // the first of CUDA_VISIBLE_DEVICES
 constexpr int kLowestMajor = 8;  // compute capability 8.0 (kernels/CMakeLists.txt)
 
 CudaDevice describe_device() {
-  int devices = 0;
+  int driver = 0, devices = 0;
+  check_cuda(cudaDriverGetVersion(&driver), "asking for the driver");
+  if (driver == 0) throw CudaError("CUDA: no NVIDIA driver here");
   check_cuda(cudaGetDeviceCount(&devices), "looking for a device");
   if (devices == 0) throw CudaError("CUDA: no device");
   cudaDeviceProp properties;

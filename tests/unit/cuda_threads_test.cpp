@@ -1,0 +1,113 @@
+// The index arithmetic of the CUDA kernels, thread by thread on the host.
+#include "kernels/launch/cuda_threads.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "parity/cuda_sphere.h"
+#include "parity/cuda_support.h"
+
+namespace ringlet::cuda_testing {
+namespace {
+
+using namespace kernels;
+
+std::vector<std::int32_t> rows_of(std::span<const std::int32_t> longest) {
+  std::vector<std::int32_t> row{0};
+  for (const std::int32_t particles : longest) row.push_back(row.back() + particles);
+  return row;
+}
+
+// Batches of these many particles, in numbers that fill the last warp and that do not.
+const std::vector<std::vector<std::int32_t>> kGrooms = {
+    {}, {7}, {3, 3}, {2, 3, 64}, {1, 1, 5, 21, 21, 21, 64, 65}};
+
+TEST(CudaThreads, EveryStrandHasOneThread) {
+  for (const auto& groom : kGrooms) {
+    const int batches = static_cast<int>(groom.size());
+    std::set<std::pair<int, int>> seen;
+    for (int thread = 0; thread < batches * kLanes; ++thread) {
+      const StrandThread at = strand_of_thread(thread);
+      EXPECT_TRUE(at.batch >= 0 && at.batch < batches && at.lane >= 0 && at.lane < kLanes);
+      EXPECT_TRUE(seen.insert({at.batch, at.lane}).second) << "thread " << thread << " repeats a strand";
+    }
+    EXPECT_EQ(seen.size(), static_cast<std::size_t>(batches) * kLanes);
+  }
+}
+
+TEST(CudaThreads, ScratchIsDisjointAndFitsAndCoalesces) {
+  for (const auto& groom : kGrooms) {
+    const int batches = static_cast<int>(groom.size());
+    const std::vector<std::int32_t> row = rows_of(groom), begin = scratch_particles(row.data(), batches);
+    std::vector<float> values(static_cast<std::size_t>(begin.back()) * kScratchReals * kWarp);
+    const WarpScratch scratch{begin.data(), values.data()};
+    std::vector<char> taken(values.size());
+    for (int thread = 0; thread < batches * kLanes; ++thread) {
+      const int particles = groom[strand_of_thread(thread).batch];
+      const std::int64_t first = scratch.of(thread) - values.data();
+      EXPECT_EQ(first % kWarp, thread % kWarp);  // a warp's threads touch 32 neighbouring words
+      EXPECT_EQ(first / kWarp % kScratchReals, 0);
+      for (int k = 0; k < particles * kScratchReals; ++k) {
+        const std::size_t at = static_cast<std::size_t>(first + std::int64_t{k} * kWarp);
+        ASSERT_LT(at, taken.size());
+        ASSERT_FALSE(taken[at]) << "thread " << thread << " shares scratch";
+        taken[at] = true;
+      }
+    }
+  }
+}
+
+TEST(CudaThreads, ScratchOffsetsPassFourBillion) {
+  constexpr int kParticles = 20'000'000;
+  EXPECT_EQ(scratch_offset(kParticles, 33), std::int64_t{kParticles} * kScratchReals * 32 + 1);
+}
+
+// All threads of a launch one after the other, each with the scratch it has on the device.
+template <class Thread>
+void run_threads(HostGroom& groom, const Thread& make) {
+  const auto& layout = groom.model.layout;
+  const auto begin = scratch_particles(layout.row().data(), layout.batches());
+  std::vector<float> values(static_cast<std::size_t>(begin.back()) * kScratchReals * kWarp);
+  const auto function = make(WarpScratch{begin.data(), values.data()});
+  for (int thread = 0; thread < layout.batches() * kLanes; ++thread) function(thread);
+}
+
+TEST(CudaThreads, StepAsTheLanesDo) {
+  const StrandParameters<float> parameters = default_parameters();
+  HostGroom lanes(mixed_strands(70, 1)), threads(mixed_strands(70, 1));
+  for (int k = 0; k < 10; ++k) {
+    lanes.move_roots(parameters.step), threads.move_roots(parameters.step);
+    lanes.step(parameters);
+    run_threads(threads, [&](WarpScratch scratch) {
+      return StrandStepThread{threads.strand_step(parameters), scratch};
+    });
+  }
+  EXPECT_EQ(lanes.state.position, threads.state.position);
+  EXPECT_EQ(lanes.state.velocity, threads.state.velocity);
+  EXPECT_EQ(lanes.strand_figures, threads.strand_figures);
+}
+
+TEST(CudaThreads, CollideAsTheLanesDo) {
+  const StrandParameters<float> parameters = default_parameters();
+  const Sphere sphere(0.06, 1, 0.006f);
+  const std::vector<SolidView> solids{sphere.view()};
+  HostGroom lanes(helices(40)), threads(helices(40));
+  float touched = 0;
+  for (int k = 0; k < 10; ++k) {
+    lanes.move_roots(parameters.step), threads.move_roots(parameters.step);
+    lanes.step(parameters), threads.step(parameters);
+    lanes.collide(solids, parameters.step);
+    run_threads(threads, [&](WarpScratch scratch) {
+      return ContactStepThread{threads.contact_step(solids, parameters.step), scratch};
+    });
+    touched += lanes.contact_figures[kTouched * kLanes];
+  }
+  EXPECT_GT(touched, 0);
+  EXPECT_EQ(lanes.state.position, threads.state.position);
+  EXPECT_EQ(lanes.state.velocity, threads.state.velocity);
+  EXPECT_EQ(lanes.contact_figures, threads.contact_figures);
+}
+
+}  // namespace
+}  // namespace ringlet::cuda_testing

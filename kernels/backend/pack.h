@@ -55,6 +55,7 @@ struct Pack {
 
   friend RINGLET_KERNEL Pack operator+(Pack a, Pack b) { return a.v + b.v; }
   friend RINGLET_KERNEL Pack operator-(Pack a, Pack b) { return a.v - b.v; }
+  friend RINGLET_KERNEL Pack operator-(Pack a) { return -a.v; }
   friend RINGLET_KERNEL Pack operator*(Pack a, Pack b) { return a.v * b.v; }
   friend RINGLET_KERNEL Pack operator/(Pack a, Pack b) { return a.v / b.v; }
   friend RINGLET_KERNEL PackMask<T, W> operator<(Pack a, Pack b) { return {a.v < b.v}; }
@@ -81,6 +82,12 @@ RINGLET_KERNEL Pack<float, 16> fma(Pack<float, 16> a, Pack<float, 16> b, Pack<fl
 RINGLET_KERNEL Pack<double, 8> fma(Pack<double, 8> a, Pack<double, 8> b, Pack<double, 8> c) {
   return _mm512_fmadd_pd(a.v, b.v, c.v);
 }
+RINGLET_KERNEL Pack<float, 16> fnma(Pack<float, 16> a, Pack<float, 16> b, Pack<float, 16> c) {
+  return _mm512_fnmadd_ps(a.v, b.v, c.v);
+}
+RINGLET_KERNEL Pack<double, 8> fnma(Pack<double, 8> a, Pack<double, 8> b, Pack<double, 8> c) {
+  return _mm512_fnmadd_pd(a.v, b.v, c.v);
+}
 RINGLET_KERNEL Pack<float, 16> sqrt(Pack<float, 16> a) { return _mm512_sqrt_ps(a.v); }
 RINGLET_KERNEL Pack<double, 8> sqrt(Pack<double, 8> a) { return _mm512_sqrt_pd(a.v); }
 inline constexpr int kFloatLanes = 16, kDoubleLanes = 8;
@@ -91,6 +98,12 @@ RINGLET_KERNEL Pack<float, 8> fma(Pack<float, 8> a, Pack<float, 8> b, Pack<float
 RINGLET_KERNEL Pack<double, 4> fma(Pack<double, 4> a, Pack<double, 4> b, Pack<double, 4> c) {
   return _mm256_fmadd_pd(a.v, b.v, c.v);
 }
+RINGLET_KERNEL Pack<float, 8> fnma(Pack<float, 8> a, Pack<float, 8> b, Pack<float, 8> c) {
+  return _mm256_fnmadd_ps(a.v, b.v, c.v);
+}
+RINGLET_KERNEL Pack<double, 4> fnma(Pack<double, 4> a, Pack<double, 4> b, Pack<double, 4> c) {
+  return _mm256_fnmadd_pd(a.v, b.v, c.v);
+}
 RINGLET_KERNEL Pack<float, 8> sqrt(Pack<float, 8> a) { return _mm256_sqrt_ps(a.v); }
 RINGLET_KERNEL Pack<double, 4> sqrt(Pack<double, 4> a) { return _mm256_sqrt_pd(a.v); }
 inline constexpr int kFloatLanes = 8, kDoubleLanes = 4;
@@ -98,6 +111,10 @@ inline constexpr int kFloatLanes = 8, kDoubleLanes = 4;
 template <class T, int W>
 RINGLET_KERNEL Pack<T, W> fma(Pack<T, W> a, Pack<T, W> b, Pack<T, W> c) {
   return a.v * b.v + c.v;
+}
+template <class T, int W>
+RINGLET_KERNEL Pack<T, W> fnma(Pack<T, W> a, Pack<T, W> b, Pack<T, W> c) {
+  return c.v - a.v * b.v;
 }
 RINGLET_KERNEL Pack<float, 4> sqrt(Pack<float, 4> a) { return _mm_sqrt_ps(a.v); }
 RINGLET_KERNEL Pack<double, 2> sqrt(Pack<double, 2> a) { return _mm_sqrt_pd(a.v); }

@@ -28,5 +28,5 @@
 #elif defined(__CUDACC__)
 #define RINGLET_UNROLL  // the host's half of a .cu file runs no kernels, and g++ knows no such pragma
 #else
-#define RINGLET_UNROLL _Pragma("GCC unroll 4")
+#define RINGLET_UNROLL _Pragma("GCC unroll 16")
 #endif

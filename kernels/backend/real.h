@@ -27,6 +27,9 @@ using Mask = typename Traits<R>::Mask;
 
 RINGLET_KERNEL float fma(float a, float b, float c) { return __builtin_fmaf(a, b, c); }
 RINGLET_KERNEL double fma(double a, double b, double c) { return __builtin_fma(a, b, c); }
+// c - a b, rounded once
+RINGLET_KERNEL float fnma(float a, float b, float c) { return __builtin_fmaf(-a, b, c); }
+RINGLET_KERNEL double fnma(double a, double b, double c) { return __builtin_fma(-a, b, c); }
 RINGLET_KERNEL float sqrt(float a) { return __builtin_sqrtf(a); }
 RINGLET_KERNEL double sqrt(double a) { return __builtin_sqrt(a); }
 RINGLET_KERNEL float select(bool mask, float a, float b) { return mask ? a : b; }
@@ -45,7 +48,7 @@ RINGLET_KERNEL R min(R a, R b) {
 }
 template <class R>
 RINGLET_KERNEL R abs(R a) {
-  return max(a, R(0) - a);
+  return max(a, -a);
 }
 
 template <class R>

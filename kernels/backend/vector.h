@@ -24,13 +24,13 @@ RINGLET_KERNEL R dot(Vector3<R> a, Vector3<R> b) {
 }
 template <class R>
 RINGLET_KERNEL Vector3<R> cross(Vector3<R> a, Vector3<R> b) {
-  return {fma(a.y, b.z, R(0) - a.z * b.y), fma(a.z, b.x, R(0) - a.x * b.z), fma(a.x, b.y, R(0) - a.y * b.x)};
+  return {fnma(a.z, b.y, a.y * b.z), fnma(a.x, b.z, a.z * b.x), fnma(a.y, b.x, a.x * b.y)};
 }
 template <class R>
 RINGLET_KERNEL R length(Vector3<R> a) {
   return sqrt(dot(a, a));
 }
-// a * s + b
+// s a + b
 template <class R>
 RINGLET_KERNEL Vector3<R> fma(R s, Vector3<R> a, Vector3<R> b) {
   return {fma(s, a.x, b.x), fma(s, a.y, b.y), fma(s, a.z, b.z)};
@@ -69,6 +69,12 @@ struct Matrix3 {  // row-major
     return {fma(m[2], a.z, fma(m[1], a.y, m[0] * a.x)), fma(m[5], a.z, fma(m[4], a.y, m[3] * a.x)),
             fma(m[8], a.z, fma(m[7], a.y, m[6] * a.x))};
   }
+  // this a + b
+  RINGLET_KERNEL Vector3<R> times_plus(Vector3<R> a, Vector3<R> b) const {
+    return {fma(m[2], a.z, fma(m[1], a.y, fma(m[0], a.x, b.x))),
+            fma(m[5], a.z, fma(m[4], a.y, fma(m[3], a.x, b.y))),
+            fma(m[8], a.z, fma(m[7], a.y, fma(m[6], a.x, b.z)))};
+  }
   RINGLET_KERNEL Vector3<R> transposed_times(Vector3<R> a) const {
     return {fma(m[6], a.z, fma(m[3], a.y, m[0] * a.x)), fma(m[7], a.z, fma(m[4], a.y, m[1] * a.x)),
             fma(m[8], a.z, fma(m[5], a.y, m[2] * a.x))};
@@ -100,25 +106,43 @@ RINGLET_KERNEL Vector3<R> operator*(const Symmetric3<R>& a, Vector3<R> b) {
           fma(a.zz, b.z, fma(a.yz, b.y, a.xz * b.x))};
 }
 
+// atan(z) / z for z in [0, 1], as a polynomial in z2 = z^2: the minimax one of relative error 1.5e-8 in
+// float; in double the Taylor series, good to 2e-17 up to z = 0.2.
+template <class R>
+RINGLET_KERNEL R arctangent_over(R z2) {
+  if constexpr (sizeof(Scalar<R>) == 8) {
+    R sum = R(1.0 / 25);
+    RINGLET_UNROLL
+    for (int k = 11; k >= 0; --k) sum = fnma(z2, sum, R(1.0 / (2 * k + 1)));
+    return sum;
+  } else {
+    R sum = R(2.84988687e-3f);
+    sum = fma(z2, sum, R(-1.60686152e-2f));
+    sum = fma(z2, sum, R(4.26914918e-2f));
+    sum = fma(z2, sum, R(-7.50429169e-2f));
+    sum = fma(z2, sum, R(1.06409324e-1f));
+    sum = fma(z2, sum, R(-1.4203644e-1f));
+    sum = fma(z2, sum, R(1.99926193e-1f));
+    sum = fma(z2, sum, R(-3.33330733e-1f));
+    return fma(z2, sum, R(9.99999985e-1f));
+  }
+}
+
 // The angle in [0, pi] whose sine and cosine are in the proportion `sine` >= 0 to `cosine`; 0 where both are
-// 0. Relative error under 2e-7 in float, 4e-16 in double: the argument is halved by atan(z) = 2 atan(z / (1 +
-// sqrt(1 + z^2))) until the odd Taylor series is short.
+// 0. Relative error under 3e-7 in float, 1e-15 in double, where atan(z) = 2 atan(z / (1 + sqrt(1 + z^2)))
+// shortens the series.
 template <class R>
 RINGLET_KERNEL R angle_between(R sine, R cosine) {
-  constexpr bool kDouble = sizeof(Scalar<R>) == 8;
-  constexpr int kHalvings = kDouble ? 2 : 1, kTerms = kDouble ? 12 : 9;
+  constexpr int kHalvings = sizeof(Scalar<R>) == 8 ? 2 : 0;
   const R adjacent = abs(cosine);
   const Mask<R> steep = sine > adjacent;
   const R large = select(steep, sine, adjacent), small = select(steep, adjacent, sine);
   R z = small / select(large > R(0), large, R(1));
   RINGLET_UNROLL
   for (int i = 0; i < kHalvings; ++i) z = z / (R(1) + sqrt(fma(z, z, R(1))));
-  const R z2 = z * z;
-  R sum = R(Scalar<R>(1) / (2 * kTerms + 1));
-  for (int k = kTerms - 1; k >= 0; --k) sum = fma(R(0) - z2, sum, R(Scalar<R>(1) / (2 * k + 1)));
-  const R acute = R(Scalar<R>(1 << kHalvings)) * z * sum;
+  const R acute = R(Scalar<R>(1 << kHalvings)) * z * arctangent_over(z * z);
   const R pi = R(Scalar<R>(3.14159265358979323846));
-  const R turned = select(steep, R(Scalar<R>(0.5)) * pi - acute, acute);
+  const R turned = select(steep, fma(R(Scalar<R>(0.5)), pi, -acute), acute);
   return select(cosine < R(0), pi - turned, turned);
 }
 

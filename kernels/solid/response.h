@@ -34,8 +34,7 @@ struct ContactStep {
 
 inline namespace RINGLET_ISA {
 
-inline constexpr int kContactReals =
-    3 + 3 + 3 + kProjectionReals + 3;  // position, velocity, normal, projection, before
+inline constexpr int kContactReals = 3 + 3 + 3 + kProjectionReals;  // position, velocity, normal, projection
 
 // Push-outs under this [m] do not ask for another round.
 template <class T>
@@ -258,7 +257,7 @@ RINGLET_FUNCTION void collide_strands(const ContactStep<Scalar<R>>& step, int ba
   }
   LaneFigures<T> figures[kWidth];
   T open[kWidth], counts[kWidth] = {}, strains[kWidth], rounds[kWidth];
-  alignas(64) T open_now[kWidth];
+  alignas(64) T open_now[kWidth], left[kWidth];
   bool any_open = false;
   const auto at_lane = [&](int l) {
     return ContactLane<R>{step, pack, batch, lane + l, l, static_cast<int>(counts[l])};
@@ -270,25 +269,27 @@ RINGLET_FUNCTION void collide_strands(const ContactStep<Scalar<R>>& step, int ba
     any_open = any_open || figures[l].touched;
   }
   const R count = load<R>(step.batches.count + batch * kLanes + lane);
-  const ProjectedStrand<R> lengths{
-      pack.position, step.batches.rest_length + base, kLanes, pack.normal, pack.projection, stride, n, count,
-      step.clamped};
-  T* before = pack.projection + kProjectionReals * n * stride;  // positions before the length projection
+  const ProjectedStrand<R> lengths{pack.position,
+                                   pack.velocity,
+                                   R(T(1) / step.step),
+                                   step.batches.rest_length + base,
+                                   kLanes,
+                                   pack.normal,
+                                   pack.projection,
+                                   stride,
+                                   n,
+                                   count,
+                                   step.clamped};
   for (int round = 0; any_open && step.length_iterations > 0 && round < step.rounds; ++round) {
     for (int l = 0; l < kWidth; ++l) open_now[l] = open[l];
-    for (int k = 0; k < 3 * n; ++k) store(before + k * stride, load<R>(pack.position + k * stride));
     project_lengths(lengths, R(step.length_tolerance), step.length_iterations, load<R>(open_now) > R(0));
-    for (int k = 0; k < 3 * n; ++k) {
-      const R moved = load<R>(pack.position + k * stride) - load<R>(before + k * stride);
-      store(pack.velocity + k * stride, fma(R(T(1) / step.step), moved, load<R>(pack.velocity + k * stride)));
-    }
     for (int l = 0; l < kWidth; ++l)
       if (open[l] > T(0)) at_lane(l).push(figures[l]), rounds[l] += T(1);
-    store(before, eliminate_lengths(lengths));
+    store(left, eliminate_lengths(lengths));
     any_open = false;
     for (int l = 0; l < kWidth; ++l) {
       if (!(open[l] > T(0))) continue;
-      strains[l] = before[l];
+      strains[l] = left[l];
       const bool settled =
           figures[l].pushed <= settled_push<T>() && strains[l] <= T(2) * step.length_tolerance;
       if (settled) open[l] = T(0);

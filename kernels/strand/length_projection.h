@@ -16,7 +16,9 @@ inline namespace RINGLET_ISA {
 // One strand's segments as the projection sees them; components `stride` apart, particles 3 `stride`.
 template <class R>
 struct ProjectedStrand {
-  Scalar<R>* position;           // [particles][3] moved in place
+  Scalar<R>* position;           // [particles][3] moved in place [m]
+  Scalar<R>* velocity;           // [particles][3] corrected by the displacement over h [m/s]
+  R per_h;                       // 1 / h [1/s]
   const Scalar<R>* rest_length;  // [particles][3], the first is the segment's; global layout
   int rest_stride;               // between components of rest_length
   const Scalar<R>* normal;       // [particles][3] contact normals, 0 where there is none; null: no contacts
@@ -63,10 +65,10 @@ RINGLET_FUNCTION R eliminate_lengths(const ProjectedStrand<R>& s) {
     const R own = dot(direction, moved_here) + dot(direction, mobility(s, k + 1, direction));
     const Mask<R> solvable = held & (own > R(Scalar<R>(1e-6)));
     direction = select(solvable, direction, zero3<R>());
-    const R link = select(solvable, R(0) - dot(previous, moved_here), R(0));  // to the segment before
+    const R link = select(solvable, -dot(previous, moved_here), R(0));  // to the segment before
     const R carry = link * inverse;
-    inverse = select(solvable, R(1) / select(solvable, fma(R(0) - link, carry, own), R(1)), R(0));
-    reduced = fma(R(0) - link, reduced, now - rest) * inverse;
+    inverse = select(solvable, R(1) / select(solvable, fnma(link, carry, own), R(1)), R(0));
+    reduced = fnma(link, reduced, now - rest) * inverse;
     store3<R>(row, s.stride, direction);
     store(row + 3 * s.stride, carry);
     store(row + 4 * s.stride, reduced);
@@ -80,15 +82,16 @@ RINGLET_FUNCTION R eliminate_lengths(const ProjectedStrand<R>& s) {
 template <class R>
 RINGLET_FUNCTION void apply_lengths(const ProjectedStrand<R>& s, Mask<R> active) {
   const auto move = [&](int particle, Vector3<R> pull) {
-    Scalar<R>* p = s.position + 3 * particle * s.stride;
-    const Vector3<R> moved = mobility(s, particle, pull);
-    store3<R>(p, s.stride, load3<R>(p, s.stride) + select(active, moved, zero3<R>()));
+    Scalar<R>*x = s.position + 3 * particle * s.stride, *v = s.velocity + 3 * particle * s.stride;
+    const Vector3<R> moved = select(active, mobility(s, particle, pull), zero3<R>());
+    store3<R>(x, s.stride, load3<R>(x, s.stride) + moved);
+    store3<R>(v, s.stride, fma(s.per_h, moved, load3<R>(v, s.stride)));
   };
   R multiplier = R(0), carry = R(0);
   Vector3<R> pull_after = zero3<R>();  // lambda d of the segment after
   for (int k = s.particles - 2; k >= 0; --k) {
     const Scalar<R>* row = s.scratch + kProjectionReals * k * s.stride;
-    multiplier = fma(R(0) - carry, multiplier, load<R>(row + 4 * s.stride));
+    multiplier = fnma(carry, multiplier, load<R>(row + 4 * s.stride));
     carry = load<R>(row + 3 * s.stride);  // this segment's link, for the one before it
     const Vector3<R> pull = multiplier * load3<R>(row, s.stride);
     move(k + 1, pull_after - pull);

@@ -288,8 +288,9 @@ RINGLET_KERNEL void step_strands(const StrandStep<Scalar<R>>& step, int batch, i
   for (int parts = 1; parts <= kMostPieces; parts *= 2) {
     R worst = R(0);
     for (int part = 0; part < parts; ++part) {
+      const StrandArrays<R> from = part == 0 ? state : stepped;
       const SubstepResult<R> result = advance_strand(s, p, piece(s.root, part, parts), R(p.step / T(parts)),
-                                                     part == 0 ? state : stepped, stepped, scratch, open);
+                                                     from, stepped, scratch, open);
       worst = select(open, result.strain, worst);
       iterations = iterations + select(open, result.iterations, R(0));
     }

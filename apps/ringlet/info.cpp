@@ -215,10 +215,12 @@ Report describe_groom(const InfoOptions& options) {
   return report;
 }
 
-// With the file's first clip where it has one.
+// With the file's first clip where it has one; whether it moves is looked at over its first four seconds.
 solids::AnimatedMesh open_mesh(const fs::path& file) {
-  const scene::Frames frames{1, 1, 24, 0};
-  scene::MeshDesc mesh{file, {}, {{}, scene::Interpolation::kSmooth, "", false}, ""};
+  const scene::Frames frames{1, 97, 24, 0};
+  scene::MeshDesc mesh{};
+  mesh.file = file;
+  mesh.animation.clip = "";
   try {
     return {mesh, kMetres, frames};
   } catch (const Error&) {

@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "kernels/launch/cuda_kernels.h"
+#include "kernels/launch/launch.h"
 #include "parity/cuda_sphere.h"
 #include "parity/cuda_support.h"
 
@@ -93,6 +94,23 @@ TEST_F(Cuda, OptionsStepBitForBit) {
 TEST_F(Cuda, OneStrandAndNoneStep) {
   expect_same_steps(HostGroom(helices(1)), default_parameters(), 3);
   expect_same_steps(HostGroom(mixed_strands(0, 1)), default_parameters(), 3);
+}
+
+// What the device is compared with, R = float, is what the program runs on the CPU, packs of float.
+TEST(CudaParity, ThePacksStepAsTheScalarsBitForBit) {
+  const InstructionSet set = best_instruction_set();
+  if (set == InstructionSet::kGeneric) GTEST_SKIP() << "no fused multiply-add on this processor";
+  const StrandParameters<float> parameters = default_parameters();
+  HostGroom scalars(mixed_strands(70, 5)), packs(mixed_strands(70, 5));
+  const state::StrandLayout& layout = packs.model.layout;
+  state::AlignedVector<float> scratch(scratch_reals(layout.longest()));
+  for (int k = 0; k < 40; ++k) {
+    scalars.move_roots(parameters.step), packs.move_roots(parameters.step);
+    scalars.step(parameters);
+    cpu_kernels<float>(set).strand_step(packs.strand_step(parameters), 0, layout.batches(), scratch.data());
+  }
+  EXPECT_EQ(differing(packs.state.position, scalars.state.position), 0);
+  EXPECT_EQ(differing(packs.state.velocity, scalars.state.velocity), 0);
 }
 
 // A rigid sphere that travels and a deforming one, a frame interval every 5 substeps.

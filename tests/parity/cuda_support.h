@@ -71,7 +71,7 @@ inline state::StrandInput mixed_strands(int strands, unsigned seed) {
 struct HostGroom {
   state::StrandModel<float> model;
   state::StrandState<float> state;
-  std::vector<float> strand_figures, contact_figures, collides;
+  state::AlignedVector<float> strand_figures, contact_figures, collides;
   int substep = 0;
 
   explicit HostGroom(const state::StrandInput& input)

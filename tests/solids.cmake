@@ -1,1 +1,1 @@
-ringlet_test(solids ringlet::solids)
+ringlet_test(solids ringlet::solids TBB::tbb fmt::fmt-header-only)

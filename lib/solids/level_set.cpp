@@ -10,7 +10,6 @@
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/MeshToVolume.h>
 #include <tbb/parallel_for.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <functional>
@@ -18,6 +17,7 @@
 
 #include "core/error.h"
 #include "solids/closest_triangle.h"
+#include "solids/surface_side.h"
 
 namespace ringlet::solids {
 namespace {
@@ -165,42 +165,69 @@ std::vector<Coord> tiles_near(const Interior& interior, int half_width) {
   return origins;
 }
 
+// The surface in voxels as the band's voxels ask about it. One for each thread.
+class Surroundings {
+ public:
+  Surroundings(const ClosestTriangle& closest, const SurfaceSide& side, const Interior& interior)
+      : closest_(closest), side_(side), flooded_(interior.query()) {}
+
+  ClosestTriangle::Hit nearest(const Eigen::Vector3f& point, float reach, std::int32_t leaf = 0) const {
+    return closest_.nearest(point, reach * reach, leaf);
+  }
+
+  bool is_inside(const Coord& voxel) const { return flooded_(voxel); }
+
+  // For a voxel this near to a triangle. What the triangle says counts where the flood may be mistaken; but
+  // nothing is outside that the flood did not come near, since the triangle may be behind another part of the
+  // surface.
+  bool is_inside(const Coord& voxel, float distance, std::int32_t triangle) const {
+    constexpr float kDoubtful = 0.3f;  // voxels
+    const bool flooded = flooded_(voxel);
+    if (distance > kDoubtful) return flooded;
+    const bool told = side_.is_inside(Vec3(voxel.x(), voxel.y(), voxel.z()), triangle).value_or(flooded);
+    if (told || !flooded) return told;
+    for (int i = 0; i < 26; ++i)
+      if (!flooded_(voxel + openvdb::util::COORD_OFFSETS[i])) return false;
+    return true;
+  }
+
+ private:
+  const ClosestTriangle& closest_;
+  const SurfaceSide& side_;
+  decltype(std::declval<Interior>().query()) flooded_;
+};
+
 // Measures the tile's voxels; none where all are farther than `half_width` voxels from the surface.
-template <class IsInside>
-std::unique_ptr<Tile> measure(const Coord& origin, const ClosestTriangle& surface, const IsInside& is_inside,
-                              float voxel_size, int half_width) {
+std::unique_ptr<Tile> measure(const Coord& origin, const Surroundings& surface, float voxel_size,
+                              int half_width) {
   constexpr float kHalfDiagonal = 6.1f;  // voxels, from a tile's middle to its corner voxels
   constexpr float kMargin = 2;  // voxels that a query looks beyond the band, to learn what need not be asked
   const auto position = [](const Coord& voxel) {
     return Eigen::Vector3i(voxel.x(), voxel.y(), voxel.z()).cast<float>().eval();
   };
   const float band = static_cast<float>(half_width), background = band * voxel_size;
-  const Eigen::Vector3f middle = position(origin) + Eigen::Vector3f::Constant(3.5f);
-  ClosestTriangle::Hit hit = surface.nearest(middle, (band + kHalfDiagonal) * (band + kHalfDiagonal));
+  Eigen::Vector3f asked = position(origin) + Eigen::Vector3f::Constant(3.5f);  // the last point asked about
+  ClosestTriangle::Hit hit = surface.nearest(asked, band + kHalfDiagonal);
   if (hit.triangle < 0) return nullptr;
   auto tile = std::make_unique<Tile>();
   tile->origin = origin;
-  bool in_band = false;
-  Eigen::Vector3f asked = middle;                 // the last point asked about,
-  float known = std::sqrt(hit.squared_distance);  // and how far at least it is from the surface
+  bool is_near = false;
   for (openvdb::Index i = 0; i < kTileVoxels; ++i) {
     const Coord voxel = origin + FloatLeaf::offsetToLocalCoord(i);
     const Eigen::Vector3f point = position(voxel);
-    tile->distance[i] = background;
-    tile->triangle[i] = -1;
-    if (known - (point - asked).norm() < band) {
-      hit = surface.nearest(point, (band + kMargin) * (band + kMargin), hit.leaf);
+    if (std::sqrt(hit.squared_distance) - (point - asked).norm() < band) {
+      hit = surface.nearest(point, band + kMargin, hit.leaf);
       asked = point;
-      known = std::sqrt(hit.squared_distance);
-      if (known < band) {
-        tile->distance[i] = known * voxel_size;
-        tile->triangle[i] = hit.triangle;
-        in_band = true;
-      }
     }
-    if (is_inside(voxel)) tile->distance[i] = -tile->distance[i];
+    const float distance = std::sqrt(hit.squared_distance);
+    const bool in_band = asked == point && distance < band;
+    const bool is_inside =
+        in_band ? surface.is_inside(voxel, distance, hit.triangle) : surface.is_inside(voxel);
+    tile->distance[i] = (is_inside ? -1 : 1) * (in_band ? distance * voxel_size : background);
+    tile->triangle[i] = in_band ? hit.triangle : -1;
+    is_near = is_near || in_band;
   }
-  return in_band ? std::move(tile) : nullptr;
+  return is_near ? std::move(tile) : nullptr;
 }
 
 }  // namespace
@@ -237,13 +264,14 @@ LevelSet build_level_set(const ClosedSurface& surface, std::span<const Eigen::Ve
   const std::vector<std::int32_t> seen_cavities = visible(cavities, *interior.cavities);
   seen.insert(seen.end(), seen_cavities.begin(), seen_cavities.end());
   const ClosestTriangle closest(points, surface.triangles, seen);
+  const SurfaceSide side(surface, points);
 
   const std::vector<Coord> origins = tiles_near(interior, half_width);
   std::vector<std::unique_ptr<Tile>> tiles(origins.size());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, origins.size()), [&](const auto& range) {
-    const auto is_inside = interior.query();
+    const Surroundings surroundings(closest, side, interior);
     for (std::size_t i = range.begin(); i != range.end(); ++i)
-      tiles[i] = measure(origins[i], closest, is_inside, voxel_size, half_width);
+      tiles[i] = measure(origins[i], surroundings, voxel_size, half_width);
   });
   std::erase(tiles, nullptr);
   return assemble(tiles, voxel_size, static_cast<float>(half_width) * voxel_size, interior.query());
@@ -324,17 +352,11 @@ LevelSet from_grids(const FloatGrid& distance, const Int32Grid& triangle, std::s
 
 void write_level_set(const std::filesystem::path& file, const LevelSet& level_set) {
   openvdb::initialize();
-  std::filesystem::path aside = file;
-  aside += fmt::format(".{}.part", ::getpid());
   try {
-    std::filesystem::create_directories(file.parent_path());
-    openvdb::io::File out(aside.string());
+    openvdb::io::File out(file.string());
     out.write(to_grids(level_set));
     out.close();
-    std::filesystem::rename(aside, file);
   } catch (const std::exception& error) {
-    std::error_code ignored;
-    std::filesystem::remove(aside, ignored);
     throw Error(ErrorKind::kIo, file.string(), std::string("cannot write the level set: ") + error.what());
   }
 }

@@ -33,7 +33,7 @@ struct LevelSet {
 LevelSet build_level_set(const ClosedSurface& surface, std::span<const Eigen::Vector3f> vertices,
                          float voxel_size, int half_width);
 
-// A .vdb of two grids, `distance` [m] and `triangle`. Written aside and renamed. Throws Error{kIo}.
+// A .vdb of two grids, `distance` [m] and `triangle`. Throws Error{kIo}.
 void write_level_set(const std::filesystem::path& file, const LevelSet& level_set);
 
 // Throws Error{kIo} where the file is not one of write_level_set's. `triangle_count` bounds what it may refer

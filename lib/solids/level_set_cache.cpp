@@ -2,7 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <unistd.h>
+
+#include <array>
 #include <cstring>
+#include <fstream>
+#include <sstream>
 
 #include "core/error.h"
 #include "core/log.h"
@@ -42,6 +47,58 @@ class Hash {
   std::uint64_t a_ = 0x243f6a8885a308d3u, b_ = 0x13198a2e03707344u;  // digits of pi
 };
 
+// A sealed file ends in a hash of what comes before: OpenVDB trusts what it reads, so that a damaged file
+// must not get as far as it. Readers of .vdb files ignore what follows the grids.
+constexpr std::size_t kSealBytes = 32;
+
+std::string seal_of(std::string_view contents) {
+  Hash hash;
+  hash.add(contents.data(), contents.size());
+  return hash.hex();
+}
+
+std::string contents_of(const std::filesystem::path& file) {
+  std::ostringstream contents;
+  contents << std::ifstream(file, std::ios::binary).rdbuf();
+  return std::move(contents).str();
+}
+
+bool is_sealed(const std::filesystem::path& file) {
+  const std::string contents = contents_of(file);
+  if (contents.size() < kSealBytes) return false;
+  const std::string_view all = contents;
+  return all.substr(all.size() - kSealBytes) == seal_of(all.substr(0, all.size() - kSealBytes));
+}
+
+LevelSet read(const std::filesystem::path& file, std::size_t triangle_count) {
+  if (!is_sealed(file)) throw Error(ErrorKind::kIo, file.string(), "the level set's file is damaged");
+  return read_level_set(file, triangle_count);
+}
+
+// A file that is removed unless it has been renamed.
+struct Aside {
+  std::filesystem::path file;
+  ~Aside() {
+    std::error_code ignored;
+    std::filesystem::remove(file, ignored);
+  }
+};
+
+// Aside, then renamed: other runs see a whole file or none.
+void write(const std::filesystem::path& file, const LevelSet& level_set) {
+  std::error_code problem;
+  std::filesystem::create_directories(file.parent_path(), problem);
+  const Aside aside{file.string() + fmt::format(".{}.part", ::getpid())};
+  write_level_set(aside.file, level_set);
+  std::ofstream(aside.file, std::ios::binary | std::ios::app) << seal_of(contents_of(aside.file));
+  if (is_sealed(aside.file)) {
+    std::filesystem::rename(aside.file, file, problem);
+  } else {
+    problem = std::make_error_code(std::errc::no_space_on_device);
+  }
+  if (problem) throw Error(ErrorKind::kIo, file.string(), "cannot write the level set: " + problem.message());
+}
+
 }  // namespace
 
 std::string content_key(const ClosedSurface& surface, std::span<const Eigen::Vector3f> vertices,
@@ -71,14 +128,14 @@ std::shared_ptr<const LevelSet> cached_level_set(const ClosedSurface& surface,
   std::error_code unreadable;
   if (std::filesystem::exists(file, unreadable)) {
     try {
-      return std::make_shared<const LevelSet>(read_level_set(file, surface.triangles.size()));
+      return std::make_shared<const LevelSet>(read(file, surface.triangles.size()));
     } catch (const Error& error) {
       log_warning(fmt::format("{}: {}; it is built anew", options.name, error.what()));
     }
   }
   std::shared_ptr<const LevelSet> built = build();
   try {
-    write_level_set(file, *built);
+    write(file, *built);
   } catch (const Error& error) {
     log_warning(fmt::format("{}: {}; the run goes on without it", options.name, error.what()));
   }

@@ -19,8 +19,9 @@ const Vec3& at(std::span<const Vec3> vertices, std::int32_t v) {
   return vertices[static_cast<std::size_t>(v)];
 }
 
-// Meshes that meet (a scalp and a face, an eye and its lid) are one surface: vertices at the same place at rest count as
-// the first of them. Which moved part a seam then follows does not matter, as long as it stays closed.
+// Meshes that meet (a scalp and a face, an eye and its lid) are one surface: vertices at the same place at
+// rest count as the first of them. Which moved part a seam then follows does not matter, as long as it stays
+// closed.
 std::vector<Triangle> join_seams(std::span<const Vec3> vertices, std::span<const Triangle> mesh) {
   struct Hash {
     std::size_t operator()(const std::array<double, 3>& p) const {
@@ -34,7 +35,8 @@ std::vector<Triangle> join_seams(std::span<const Vec3> vertices, std::span<const
   std::vector<std::int32_t> same(vertices.size());
   for (std::size_t v = 0; v < vertices.size(); ++v) {
     const Vec3& x = vertices[v];
-    same[v] = first.try_emplace({x.x() + 0.0, x.y() + 0.0, x.z() + 0.0}, static_cast<std::int32_t>(v)).first->second;
+    same[v] = first.try_emplace({x.x() + 0.0, x.y() + 0.0, x.z() + 0.0}, static_cast<std::int32_t>(v))
+                  .first->second;
   }
   std::vector<Triangle> joined(mesh.begin(), mesh.end());
   for (Triangle& t : joined)
@@ -108,7 +110,8 @@ std::vector<std::vector<Edge>> find_loops(const std::vector<Edge>& edges) {
   return loops;
 }
 
-// Across each triangle's edges, corner k to k + 1: the other triangle there; -1 where there is none, or more than one.
+// Across each triangle's edges, corner k to k + 1: the other triangle there; -1 where there is none, or more
+// than one.
 std::vector<std::int32_t> find_neighbours(const std::vector<Triangle>& triangles) {
   struct Uses {
     std::int32_t side[2] = {-1, -1};  // 3 * triangle + edge
@@ -121,7 +124,8 @@ std::vector<std::int32_t> find_neighbours(const std::vector<Triangle>& triangles
     if (is_degenerate(triangles[t])) continue;
     for (std::size_t c = 0; c < 3; ++c) {
       const std::int32_t a = triangles[t][c], b = triangles[t][(c + 1) % 3];
-      Uses& uses = edges[static_cast<std::uint64_t>(std::min(a, b)) << 32 | static_cast<std::uint32_t>(std::max(a, b))];
+      Uses& uses = edges[static_cast<std::uint64_t>(std::min(a, b)) << 32 |
+                         static_cast<std::uint32_t>(std::max(a, b))];
       if (uses.count < 2) uses.side[uses.count] = static_cast<std::int32_t>(3 * t + c);
       ++uses.count;
     }

@@ -9,12 +9,14 @@
 namespace ringlet::solids {
 
 struct ClosedSurface {
-  std::vector<Triangle> triangles;  // the mesh's own, in their order (seams joined, some turned), then the caps'
-  std::vector<bool>
-      bounds_cavity;  // [triangles] of a part that lies inside another and faces inward: a hollow's wall
-  std::vector<std::vector<std::int32_t>>
-      loops;  // the boundary loops capped; loop i's centre is vertex mesh_vertices + i
-  std::vector<std::int32_t> neighbours;  // [triangles * 3] across the edge from corner k to k + 1, -1: none
+  // The mesh's own, in their order (seams joined, some turned), then the caps'.
+  std::vector<Triangle> triangles;
+  // [triangles] Of a part that lies inside another and faces inward: a hollow's wall.
+  std::vector<bool> bounds_cavity;
+  // [triangles * 3] Across the edge from corner k to k + 1; -1 where there is none, or more than one.
+  std::vector<std::int32_t> neighbours;
+  // The boundary loops capped. Loop i's centre is vertex mesh_vertices + i.
+  std::vector<std::vector<std::int32_t>> loops;
   std::size_t mesh_vertices = 0;
 
   std::size_t vertex_count() const { return mesh_vertices + loops.size(); }

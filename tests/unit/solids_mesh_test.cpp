@@ -307,6 +307,92 @@ TEST_F(MeshTest, ColladaSaysMetresYUpBySilence) {
   EXPECT_LE((lower_corner(mesh) - Vec3(0, -3, 0)).norm(), 1e-6);
 }
 
+// A tetrahedron, z up, in inches, that its clip lifts by 4 in a second.
+constexpr const char* kFbx = R"(; FBX 7.3.0 project file
+FBXHeaderExtension:  {
+  FBXHeaderVersion: 1003
+  FBXVersion: 7300
+}
+GlobalSettings:  {
+  Version: 1000
+  Properties70:  {
+    P: "UpAxis", "int", "Integer", "",2
+    P: "UpAxisSign", "int", "Integer", "",1
+    P: "UnitScaleFactor", "double", "Number", "",2.54
+    P: "TimeMode", "enum", "", "",11
+  }
+}
+Objects:  {
+  Geometry: 100, "Geometry::part", "Mesh" {
+    Vertices: *12 {
+      a: 0,0,0,1,0,0,0,2,0,0,0,3
+    }
+    PolygonVertexIndex: *12 {
+      a: 0,2,-2,0,1,-4,1,2,-4,0,3,-3
+    }
+    GeometryVersion: 124
+  }
+  Model: 200, "Model::part", "Mesh" {
+    Version: 232
+    Properties70:  {
+      P: "Lcl Translation", "Lcl Translation", "", "A",0,0,10
+    }
+  }
+  AnimationStack: 300, "AnimStack::lift", "" {
+    Properties70:  {
+      P: "LocalStop", "KTime", "Time", "",46186158000
+      P: "ReferenceStop", "KTime", "Time", "",46186158000
+    }
+  }
+  AnimationLayer: 400, "AnimLayer::base", "" {
+  }
+  AnimationCurveNode: 500, "AnimCurveNode::T", "" {
+    Properties70:  {
+      P: "d|X", "Number", "", "A",0
+      P: "d|Y", "Number", "", "A",0
+      P: "d|Z", "Number", "", "A",10
+    }
+  }
+  AnimationCurve: 600, "AnimCurve::", "" {
+    Default: 0
+    KeyVer: 4008
+    KeyTime: *2 {
+      a: 0,46186158000
+    }
+    KeyValueFloat: *2 {
+      a: 10,14
+    }
+    KeyAttrFlags: *1 {
+      a: 260
+    }
+    KeyAttrDataFloat: *4 {
+      a: 0,0,0,0
+    }
+    KeyAttrRefCount: *1 {
+      a: 2
+    }
+  }
+}
+Connections:  {
+  C: "OO",200,0
+  C: "OO",100,200
+  C: "OO",400,300
+  C: "OO",500,400
+  C: "OP",500,200, "Lcl Translation"
+  C: "OP",600,500, "d|Z"
+}
+)";
+
+TEST_F(MeshTest, FbxDeclaresItsUnitsAndMoves) {
+  const AnimatedMesh mesh(mesh_desc(write("part.fbx", kFbx), "lift"), kMetresYUp, kTwoSeconds);
+  EXPECT_EQ(mesh.vertex_count(), 4u);
+  EXPECT_EQ(mesh.motion(), Motion::kRigid);
+  EXPECT_LE((upper_corner(mesh) - 0.0254 * Vec3(1, 13, 0)).norm(), 1e-6);  // (x, y, z) becomes (x, z, -y)
+  EXPECT_LE((lower_corner(mesh) - 0.0254 * Vec3(0, 10, -2)).norm(), 1e-6);
+  EXPECT_LE((mesh.pose(0.5).position - Vec3(0, 2 * 0.0254, 0)).norm(), 1e-6);
+  EXPECT_LE((mesh.pose(1.7).position - Vec3(0, 4 * 0.0254, 0)).norm(), 1e-6);
+}
+
 TEST_F(MeshTest, GltfIsMetresUnlessTheSceneSaysOtherwise) {
   const AnimatedMesh declared(mesh_desc(turning_node()), {0.01, scene::Axis::kY}, kTwoSeconds);
   expect_near(declared.rest_vertices(), turned(0), 1e-6);

@@ -6,8 +6,8 @@
 namespace ringlet::kernels {
 inline namespace RINGLET_ISA {
 
-// Barycentric coordinates of the point of triangle abc closest to p. A degenerate triangle gives one of its
-// corners.
+// Barycentric coordinates of the point of triangle abc closest to p. A triangle without area gives one
+// of its points, if not the closest: in a mesh its neighbours have that one.
 template <class T>
 RINGLET_FUNCTION Vector3<T> closest_barycentrics(Vector3<T> p, Vector3<T> a, Vector3<T> b, Vector3<T> c) {
   const T zero = T(0), one = T(1);

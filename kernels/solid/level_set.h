@@ -26,44 +26,51 @@ RINGLET_FUNCTION std::int64_t voxel_at(const LevelSetView& set, int x, int y, in
   return tile < 0 ? tile : static_cast<std::int64_t>(tile) * 512 + ((x & 7) << 6 | (y & 7) << 3 | (z & 7));
 }
 
-inline constexpr int kCorners = 8;
-
 template <class T>
 struct LevelSetSample {
-  T distance;    // [m], plus or minus the background beyond the band
-  bool in_band;  // the corners' triangles are worth a look
-  std::int32_t triangle[kCorners];
+  T distance;             // [m], plus or minus the background beyond the band
+  std::int32_t triangle;  // closest to the voxel nearest to the point; -1 where unknown
 };
+
+// A value beyond this many voxels needs no interpolation: the surface is not in the cell.
+inline constexpr float kFarVoxels = 3.0f;
 
 // `p` in level-set coordinates [m].
 template <class T>
 RINGLET_FUNCTION LevelSetSample<T> sample_level_set(const LevelSetView& set, Vector3<T> p) {
-  LevelSetSample<T> sample;
-  const T per_voxel = T(1) / static_cast<T>(set.voxel_size);
+  const T per_voxel = T(1) / static_cast<T>(set.voxel_size), background = static_cast<T>(set.background);
   const T limit = T(1e9);  // far enough; keeps the conversion to int defined
-  const Vector3<T> q = {min(max(p.x * per_voxel, -limit), limit), min(max(p.y * per_voxel, -limit), limit),
-                        min(max(p.z * per_voxel, -limit), limit)};
+  const auto index = [&](T a) { return min(max(a * per_voxel, T(0) - limit), limit); };
+  const Vector3<T> q = {index(p.x), index(p.y), index(p.z)};
+  const auto nearest = [](T a) { return floor_to_int(a + T(0.5)); };
+  const std::int64_t centre = voxel_at(set, nearest(q.x), nearest(q.y), nearest(q.z));
+  if (centre < 0) return {centre == kTileInside ? T(0) - background : background, -1};
+  const T value = static_cast<T>(set.distance[centre]);
+  const std::int32_t triangle = set.triangle[centre];
+  if (abs(value) > static_cast<T>(kFarVoxels * set.voxel_size)) return {value, triangle};
+
   const int x = floor_to_int(q.x), y = floor_to_int(q.y), z = floor_to_int(q.z);
-  const std::int32_t tile = tile_at(set, x >> 3, y >> 3, z >> 3);
-  if (tile < 0) {
-    sample.in_band = false;
-    sample.distance = tile == kTileInside ? -static_cast<T>(set.background) : static_cast<T>(set.background);
-    return sample;
-  }
-  const T fx = q.x - static_cast<T>(x), fy = q.y - static_cast<T>(y), fz = q.z - static_cast<T>(z);
-  sample.in_band = true;
-  sample.distance = T(0);
-  for (int corner = 0; corner < kCorners; ++corner) {
-    const int dx = corner >> 2, dy = corner >> 1 & 1, dz = corner & 1;
-    const std::int64_t voxel = voxel_at(set, x + dx, y + dy, z + dz);
-    const T value = voxel >= 0 ? static_cast<T>(set.distance[voxel])
-                               : (voxel == kTileInside ? -static_cast<T>(set.background)
-                                                       : static_cast<T>(set.background));
-    sample.triangle[corner] = voxel >= 0 ? set.triangle[voxel] : -1;
-    const T weight = (dx ? fx : T(1) - fx) * (dy ? fy : T(1) - fy) * (dz ? fz : T(1) - fz);
-    sample.distance = fma(weight, value, sample.distance);
-  }
-  return sample;
+  const T f[3] = {q.x - static_cast<T>(x), q.y - static_cast<T>(y), q.z - static_cast<T>(z)};
+  const auto at = [&](int corner) {
+    const std::int64_t voxel = voxel_at(set, x + (corner >> 2), y + (corner >> 1 & 1), z + (corner & 1));
+    if (voxel < 0) return voxel == kTileInside ? T(0) - background : background;
+    return static_cast<T>(set.distance[voxel]);
+  };
+  const auto mix = [](T t, T a, T b) { return fma(t, b - a, a); };
+  const T low = mix(f[1], mix(f[2], at(0), at(1)), mix(f[2], at(2), at(3)));
+  const T high = mix(f[1], mix(f[2], at(4), at(5)), mix(f[2], at(6), at(7)));
+  return {mix(f[0], low, high), triangle};
+}
+
+// The triangles closest to the corners of the cell that holds p; -1 where unknown.
+inline constexpr int kCorners = 8;
+template <class T>
+RINGLET_FUNCTION std::int32_t corner_triangle(const LevelSetView& set, Vector3<T> p, int corner) {
+  const T per_voxel = T(1) / static_cast<T>(set.voxel_size);
+  const std::int64_t voxel = voxel_at(set, floor_to_int(p.x * per_voxel) + (corner >> 2),
+                                      floor_to_int(p.y * per_voxel) + (corner >> 1 & 1),
+                                      floor_to_int(p.z * per_voxel) + (corner & 1));
+  return voxel < 0 ? -1 : set.triangle[voxel];
 }
 
 }  // namespace RINGLET_ISA

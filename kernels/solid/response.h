@@ -68,6 +68,10 @@ struct LaneContact {
   RINGLET_FUNCTION SurfaceSample<T> sample(Vector3<T> x) const {
     return sample_surface(solid, root + rotate_back(solid.rotation, x));
   }
+  // The same where only what is well inside matters: outside the level set's word is enough.
+  RINGLET_FUNCTION SurfaceSample<T> sample_inside(Vector3<T> x) const {
+    return sample_surface(solid, root + rotate_back(solid.rotation, x), T(0));
+  }
   RINGLET_FUNCTION Vector3<T> world_normal(const SurfaceSample<T>& at) const {
     return rotate(solid.rotation, at.normal);
   }
@@ -161,33 +165,41 @@ struct ContactPack {
   }
 };
 
+// How deep a segment may dip into the solid between its particles, in voxels: hair that lies on a round head
+// is a polyline of chords. What is deeper is a thin part of the solid between two particles.
+inline constexpr float kChordVoxels = 0.25f;
+
 // Segments longer than two voxels are sampled along their length too, or fingers pass between particles: a
-// sample that is inside moves both ends.
+// sample that is inside moves both ends. The root's own segment comes out of the solid and is left alone.
 template <class R, class T>
 RINGLET_FUNCTION void push_segments(const ContactPack<R>& s, const LaneContact<T>& contact, int lane,
                                     int first, int count, LaneFigures<T>& figures) {
-  for (int i = first > 0 ? first - 1 : 0; i + 1 < count; ++i) {
+  const T allowed = static_cast<T>(kChordVoxels) * contact.voxel;
+  for (int i = first; i + 1 < count; ++i) {
     Vector3<T> a = s.get(s.position, i, lane), b = s.get(s.position, i + 1, lane);
     const int pieces = static_cast<int>(min(T(64), length(b - a) / (T(2) * contact.voxel))) + 1;
     for (int k = 1; k < pieces; ++k) {
       const T t = static_cast<T>(k) / static_cast<T>(pieces);
-      const SurfaceSample<T> at = contact.sample(fma(t, b - a, a));
-      if (!(at.distance < T(0)) || !at.exact) continue;
+      const SurfaceSample<T> at = contact.sample_inside(fma(t, b - a, a));
+      const T depth = T(0) - at.distance - allowed;
+      if (!(depth > T(0)) || !at.exact) continue;
       const Vector3<T> n = contact.world_normal(at);
-      const T free_a = i < first ? T(0) : T(1);
-      const T push = -at.distance / fma(free_a * (T(1) - t), T(1) - t, t * t);
-      const T most = T(2) * contact.voxel;  // near the fixed end no finite push would do
-      const T bounded = min(push, most);
-      a = fma(free_a * (T(1) - t) * bounded, n, a), b = fma(t * bounded, n, b);
-      figures.touched = true;
-      figures.pushed = max(figures.pushed, -at.distance);
-      if (free_a > T(0)) s.set(s.position, i, lane, a), s.set(s.normal, i, lane, n);
+      const T share = T(1) / fma(T(1) - t, T(1) - t, t * t);
+      a = fma((T(1) - t) * share * depth, n, a), b = fma(t * share * depth, n, b);
+      // The sample's velocity responds as a particle's: left alone it would come back faster every time.
+      const Vector3<T> va = s.get(s.velocity, i, lane), vb = s.get(s.velocity, i + 1, lane);
+      const Vector3<T> v = fma(t, vb - va, va), changed = contact.respond(at, n, v) - v;
+      s.set(s.velocity, i, lane, fma((T(1) - t) * share, changed, va));
+      s.set(s.velocity, i + 1, lane, fma(t * share, changed, vb));
+      s.set(s.position, i, lane, a), s.set(s.normal, i, lane, n);
       s.set(s.position, i + 1, lane, b), s.set(s.normal, i + 1, lane, n);
+      figures.touched = true;
+      figures.pushed = max(figures.pushed, depth);
     }
   }
 }
 
-// Pushes out whatever is inside, without changing velocities; notes the normals.
+// Pushes out whatever is inside, without changing the particles' own velocities; notes the normals.
 template <class R, class T>
 RINGLET_FUNCTION void push_out(const ContactPack<R>& s, const LaneContact<T>& contact, int lane, int first,
                                int count, LaneFigures<T>& figures) {

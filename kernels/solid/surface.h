@@ -53,42 +53,69 @@ RINGLET_FUNCTION Vector3<T> unit_normal(const SolidView& solid, std::int32_t tri
   return inverse_or_zero(length(n), T(1e-20)) * n;
 }
 
-// Walks from triangle to neighbour while that comes closer.
+// The triangles that share a closest point: across the edge it lies on, around the corner it lies at; none
+// where it lies inside its triangle. Calls visit(triangle) for each but the triangle itself.
+template <class T, class Visit>
+RINGLET_FUNCTION void for_each_sharing(const SolidView& solid, const ClosestPoint<T>& at,
+                                       const Visit& visit) {
+  constexpr int kMostAround = 24;
+  const T zero = T(0), w[3] = {at.barycentric.x, at.barycentric.y, at.barycentric.z};
+  for (int k = 0; k < 3; ++k) {
+    const std::int64_t row = 3 * static_cast<std::int64_t>(at.triangle);
+    const bool on_edge = w[(k + 2) % 3] <= zero, at_corner = on_edge && w[(k + 1) % 3] <= zero;
+    if (on_edge && !at_corner && w[k] > zero && w[(k + 1) % 3] > zero && solid.neighbours[row + k] >= 0)
+      visit(solid.neighbours[row + k]);
+    if (!at_corner) continue;
+    const std::int32_t vertex = solid.triangles[row + k];
+    std::int32_t triangle = solid.neighbours[row + k];
+    for (int n = 0; n < kMostAround && triangle >= 0 && triangle != at.triangle; ++n) {
+      visit(triangle);
+      const std::int32_t* v = solid.triangles + 3 * static_cast<std::int64_t>(triangle);
+      const int corner_there = v[0] == vertex ? 0 : v[1] == vertex ? 1 : 2;
+      triangle = solid.neighbours[3 * static_cast<std::int64_t>(triangle) + corner_there];
+    }
+  }
+}
+
+template <class T>
+RINGLET_FUNCTION void consider(const SolidView& solid, std::int32_t triangle, Vector3<T> p,
+                               ClosestPoint<T>& best) {
+  if (triangle < 0 || triangle == best.triangle) return;
+  const ClosestPoint<T> found = closest_on_triangle(solid, triangle, p);
+  if (found.distance2 < best.distance2) best = found;
+}
+
+// Walks over the surface while that comes closer.
 template <class T>
 RINGLET_FUNCTION void walk(const SolidView& solid, Vector3<T> p, ClosestPoint<T>& best) {
   constexpr int kMostSteps = 64;
   for (int step = 0; step < kMostSteps; ++step) {
-    const std::int32_t from = best.triangle;
-    for (int edge = 0; edge < 3; ++edge) {
-      const std::int32_t other = solid.neighbours[3 * static_cast<std::int64_t>(from) + edge];
-      if (other < 0) continue;
-      const ClosestPoint<T> found = closest_on_triangle(solid, other, p);
-      if (found.distance2 < best.distance2) best = found;
-    }
-    if (best.triangle == from) return;
+    const ClosestPoint<T> from = best;
+    for_each_sharing(solid, from, [&](std::int32_t triangle) { consider(solid, triangle, p, best); });
+    if (best.triangle == from.triangle) return;
   }
 }
 
 // The outward direction at a closest point: the triangle's normal, on an edge or corner the sum over the
-// triangles that share it (those as close), found among the neighbours.
+// triangles that share it.
 template <class T>
-RINGLET_FUNCTION Vector3<T> outward(const SolidView& solid, Vector3<T> p, const ClosestPoint<T>& best) {
+RINGLET_FUNCTION Vector3<T> outward(const SolidView& solid, const ClosestPoint<T>& best) {
   Vector3<T> sum = unit_normal<T>(solid, best.triangle);
-  const T tie = best.distance2 * T(1.0001) + T(1e-14);
-  for (int edge = 0; edge < 3; ++edge) {
-    const std::int32_t other = solid.neighbours[3 * static_cast<std::int64_t>(best.triangle) + edge];
-    if (other >= 0 && closest_on_triangle(solid, other, p).distance2 <= tie)
-      sum = sum + unit_normal<T>(solid, other);
-  }
+  for_each_sharing(solid, best, [&](std::int32_t triangle) { sum = sum + unit_normal<T>(solid, triangle); });
   return sum;
 }
 
-// How near the level set must say the surface is for the exact mesh to be asked, in voxels.
-inline constexpr float kNearVoxels = 1.5f;
+// How near the level set must say the surface is for the exact mesh to be asked, in voxels: its samples are
+// exact, and between them a trilinear value is off by less than this even across a sharp edge.
+inline constexpr float kNearVoxels = 0.5f;
 
-// `p` in level-set coordinates at the substep's end [m].
+// By how much the exact distance may differ from the level set's before it is doubted, in voxels.
+inline constexpr float kDoubtVoxels = 0.1f;
+
+// `p` in level-set coordinates at the substep's end [m]. Where the level set puts the surface farther than
+// `near` [m] only the distance is given.
 template <class T>
-RINGLET_OUTLINED SurfaceSample<T> sample_surface(const SolidView& solid, Vector3<T> p) {
+RINGLET_OUTLINED SurfaceSample<T> sample_surface(const SolidView& solid, Vector3<T> p, T near) {
   const LevelSetSample<T> first = sample_level_set(solid.level_set[0], p);
   LevelSetSample<T> second = first;
   T distance = first.distance;
@@ -98,27 +125,28 @@ RINGLET_OUTLINED SurfaceSample<T> sample_surface(const SolidView& solid, Vector3
   }
   SurfaceSample<T> sample{distance - static_cast<T>(solid.offset), false, zero3<T>(), -1, zero3<T>()};
   const T voxel = static_cast<T>(solid.level_set[0].voxel_size);
-  if (sample.distance > static_cast<T>(kNearVoxels) * voxel) return sample;
+  if (sample.distance > near) return sample;
 
   ClosestPoint<T> best{T(1e30), zero3<T>(), zero3<T>(), -1};
-  for (int k = 0; k < 2 * kCorners; ++k) {
-    const LevelSetSample<T>& of = k < kCorners ? first : second;
-    if (!of.in_band || (k >= kCorners && solid.blend <= 0.0f)) continue;
-    const std::int32_t triangle = of.triangle[k % kCorners];
-    if (triangle < 0 || triangle == best.triangle) continue;
-    const ClosestPoint<T> found = closest_on_triangle(solid, triangle, p);
-    if (found.distance2 < best.distance2) best = found;
-  }
+  consider(solid, first.triangle, p, best);
+  consider(solid, second.triangle, p, best);
   if (best.triangle < 0) {  // past the band, deep inside: ask every triangle
-    for (std::int32_t triangle = 0; triangle < solid.triangle_count; ++triangle) {
-      const ClosestPoint<T> found = closest_on_triangle(solid, triangle, p);
-      if (found.distance2 < best.distance2) best = found;
-    }
+    for (std::int32_t triangle = 0; triangle < solid.triangle_count; ++triangle)
+      consider(solid, triangle, p, best);
   }
   if (best.triangle < 0) return sample;
   walk(solid, p, best);
+  // The walk can end where another fold of the surface is closer still. Then it disagrees with the level set:
+  // ask the triangles of the whole cell.
+  if (abs(sqrt(best.distance2) - abs(distance)) > static_cast<T>(kDoubtVoxels) * voxel) {
+    for (int corner = 0; corner < kCorners; ++corner) {
+      consider(solid, corner_triangle(solid.level_set[0], p, corner), p, best);
+      if (solid.blend > 0.0f) consider(solid, corner_triangle(solid.level_set[1], p, corner), p, best);
+    }
+    walk(solid, p, best);
+  }
 
-  const Vector3<T> out = outward(solid, p, best);
+  const Vector3<T> out = outward(solid, best);
   const T away = sqrt(best.distance2);
   const bool far_from_zero = abs(distance) > T(0.75) * voxel;  // there the level set knows the side
   const bool inside = far_from_zero ? distance < T(0) : dot(best.to_point, out) < T(0);
@@ -131,6 +159,11 @@ RINGLET_OUTLINED SurfaceSample<T> sample_surface(const SolidView& solid, Vector3
   sample.triangle = best.triangle;
   sample.barycentric = best.barycentric;
   return sample;
+}
+
+template <class T>
+RINGLET_FUNCTION SurfaceSample<T> sample_surface(const SolidView& solid, Vector3<T> p) {
+  return sample_surface(solid, p, static_cast<T>(kNearVoxels * solid.level_set[0].voxel_size));
 }
 
 // World from level-set axes and back.

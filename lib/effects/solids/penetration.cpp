@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "kernels/solid/surface.h"
+#include "kernels/solid/response.h"
 
 namespace ringlet::effects {
 namespace {
@@ -35,6 +35,32 @@ void push_out(const Surface& surface, Vec3& x) {
     const auto sample = surface.at(x);
     if (!sample.exact || sample.distance >= 0.5 * kClearance) return;
     x += (kClearance - sample.distance) * surface.normal(sample);
+  }
+}
+
+// Segments too, as the contact stage will see them: where one dips deeper than that stage allows, both ends
+// move.
+void push_out_segments(const Surface& surface, std::span<Vec3> strand) {
+  const double voxel = surface.solid.level_set[0].voxel_size, allowed = 0.9 * kernels::kChordVoxels * voxel;
+  for (std::size_t i = 1; i + 1 < strand.size(); ++i) {
+    Vec3 &a = strand[i], &b = strand[i + 1];
+    const int pieces = static_cast<int>(std::min(64.0, (b - a).norm() / (2 * voxel))) + 1;
+    for (int k = 1; k < pieces; ++k) {
+      const double t = static_cast<double>(k) / pieces;
+      const auto sample = surface.at(a + t * (b - a));
+      const double depth = -sample.distance - allowed;
+      if (depth <= 0 || !sample.exact) continue;
+      const Vec3 push = depth / ((1 - t) * (1 - t) + t * t) * surface.normal(sample);
+      a += (1 - t) * push, b += t * push;
+    }
+  }
+}
+
+void push_out_strand(const Surface& surface, std::span<Vec3> strand) {
+  constexpr int kRounds = 4;
+  for (int round = 0; round < kRounds; ++round) {
+    push_out_segments(surface, strand);
+    for (std::size_t i = 1; i < strand.size(); ++i) push_out(surface, strand[i]);
   }
 }
 
@@ -73,7 +99,7 @@ PenetrationReport resolve_penetration(scene::Penetration policy, const kernels::
       if (reports[s].buried) {
         collides[s] = 0;
       } else if (policy == scene::Penetration::kPushOut) {
-        for (std::size_t i = 1; i < strand.size(); ++i) push_out(surface, strand[i]);
+        push_out_strand(surface, strand);
       } else if (policy == scene::Penetration::kPrune && reports[s].inside > 0) {
         prune[s] = 1;
       }

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "kernels/launch/launch.h"
-#include "kernels/strand/strand_step.h"
 #include "oracle/ams_reference.h"
 #include "oracle/helix.h"
 #include "state/strand_model.h"
@@ -17,27 +16,18 @@ namespace ringlet::kernels_testing {
 
 using oracle::RootPose;
 
-// A machine is a precision and the kernels for it. The scalar ones take the same source a strand at a time.
+// The kernels a strand at a time, without packs (unit/kernels_support.cpp).
+template <class T>
+const kernels::KernelTable<T>& scalar_kernels();
+
+// A machine is a precision and the kernels for it.
 template <class Real>
 struct ScalarMachine {
   using T = Real;
   static constexpr bool kFused = true;  // multiply-adds round once: bits are those of every fused machine
   static std::string name() { return "scalar"; }
   static bool available() { return true; }
-  static const kernels::KernelTable<T>& kernels() {
-    static const kernels::KernelTable<T> table = {
-        [](const kernels::StrandStep<T>& step, int begin, int end, T* scratch) {
-          for (int batch = begin; batch < end; ++batch)
-            for (int lane = 0; lane < kernels::kLanes; ++lane)
-              kernels::step_strands<T>(step, batch, lane, scratch, 1);
-        },
-        [](const kernels::ContactStep<T>& step, int begin, int end, T* scratch) {
-          for (int batch = begin; batch < end; ++batch)
-            for (int lane = 0; lane < kernels::kLanes; ++lane)
-              kernels::collide_strands<T>(step, batch, lane, scratch, 1);
-        }};
-    return table;
-  }
+  static const kernels::KernelTable<T>& kernels() { return scalar_kernels<T>(); }
 };
 
 template <class Real, kernels::InstructionSet kSet>
@@ -157,6 +147,27 @@ class StrandRun {
     poses_ = after;
   }
 
+  // The contact stage after a step; lengths as `parameters` says.
+  void collide(const std::vector<kernels::SolidView>& solids, int at_a_time = 0) {
+    const int batches = model.layout.batches(), piece = at_a_time > 0 ? at_a_time : batches;
+    const state::AlignedVector<T> collides(batches * kernels::kLanes, T(1));
+    contact_figures.assign(static_cast<std::size_t>(batches) * kernels::kContactFigures * kernels::kLanes,
+                           T(0));
+    kernels::ContactStep<T> step{};
+    step.batches = model.view(), step.state = state.view(), step.root_points = state.root_points.data();
+    step.collides = collides.data(), step.solids = solids.data();
+    step.solid_count = static_cast<std::int32_t>(solids.size());
+    step.step = parameters.step, step.clamped = parameters.clamped, step.rounds = 8;
+    step.length_iterations = parameters.length_iterations,
+    step.length_tolerance = parameters.length_tolerance;
+    step.figures = contact_figures.data();
+    for (int begin = 0; begin < batches; begin += piece)
+      Machine::kernels().contact_step(step, begin, std::min(begin + piece, batches), scratch.data());
+  }
+
+  double contact_figure(std::size_t strand, kernels::ContactFigure which) const {
+    return contact_figures[model.layout.at_strand(strand, kernels::kContactFigures, which)];
+  }
   double figure(std::size_t strand, kernels::StrandFigure which) const {
     return figures[model.layout.at_strand(strand, kernels::kFigures, which)];
   }
@@ -164,7 +175,7 @@ class StrandRun {
   state::StrandModel<T> model;
   state::StrandState<T> state;
   kernels::StrandParameters<T> parameters{};
-  state::AlignedVector<T> figures, scratch;
+  state::AlignedVector<T> figures, contact_figures, scratch;
 
  private:
   static state::StrandInput input_of(const std::vector<oracle::Strand>& strands,
@@ -189,6 +200,14 @@ class StrandRun {
 
   std::vector<RootPose> poses_;
 };
+
+// The run with every spring, ghost, weight and drag taken away: a step advances and projects, nothing else.
+template <class Machine>
+void make_forceless(StrandRun<Machine>& run) {
+  std::fill(run.model.stiffness.begin(), run.model.stiffness.end(), 0);
+  run.parameters.gravity[0] = run.parameters.gravity[1] = run.parameters.gravity[2] = 0;
+  run.parameters.drag = run.parameters.damping = 0;
+}
 
 // One strand through `steps` of the helix's steps by the kernels.
 template <class Machine>

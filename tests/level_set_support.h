@@ -144,6 +144,12 @@ struct Band {
   }
 };
 
+// The surface whose vertices are exactly those that a kernel sees.
+inline Surface in_float(Surface surface) {
+  for (auto& v : surface.vertices) v = v.cast<float>().cast<double>();
+  return surface;
+}
+
 // A solid that stands where its mesh does until the view is changed. The view lives as long as the solid.
 struct MeshSolid {
   Surface surface;
@@ -152,7 +158,7 @@ struct MeshSolid {
   std::vector<float> vertices;
 
   MeshSolid(Surface mesh, double voxel_size, double half_width_voxels = 3)
-      : surface(std::move(mesh)),
+      : surface(in_float(std::move(mesh))),
         band(surface, voxel_size, half_width_voxels),
         neighbours(surface.neighbours()) {
     for (const auto& v : surface.vertices)

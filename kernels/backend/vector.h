@@ -129,15 +129,15 @@ RINGLET_KERNEL R arctangent_over(R z2) {
 }
 
 // The angle in [0, pi] whose sine and cosine are in the proportion `sine` >= 0 to `cosine`; 0 where both are
-// 0. Relative error under 3e-7 in float, 1e-15 in double, where atan(z) = 2 atan(z / (1 + sqrt(1 + z^2)))
-// shortens the series.
+// 0, NaN where either is. Relative error under 3e-7 in float, 1e-15 in double, where atan(z) = 2 atan(z / (1
+// + sqrt(1 + z^2))) shortens the series.
 template <class R>
 RINGLET_KERNEL R angle_between(R sine, R cosine) {
   constexpr int kHalvings = sizeof(Scalar<R>) == 8 ? 2 : 0;
   const R adjacent = abs(cosine);
   const Mask<R> steep = sine > adjacent;
   const R large = select(steep, sine, adjacent), small = select(steep, adjacent, sine);
-  R z = small / select(large > R(0), large, R(1));
+  R z = small / max(large, R(Scalar<R>(1e-37)));
   RINGLET_UNROLL
   for (int i = 0; i < kHalvings; ++i) z = z / (R(1) + sqrt(fma(z, z, R(1))));
   const R acute = R(Scalar<R>(1 << kHalvings)) * z * arctangent_over(z * z);

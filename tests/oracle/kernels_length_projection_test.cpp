@@ -1,0 +1,200 @@
+// The length projection against the reference's: what it leaves, what it keeps, where it gives up.
+#include <gtest/gtest.h>
+
+#include "kernels_support.h"
+#include "oracle/random_strand.h"
+
+namespace ringlet::kernels_testing {
+namespace {
+
+using oracle::Points;
+using oracle::RandomStrand;
+using oracle::Strand;
+
+template <class Machine>
+class KernelLengths : public OnMachine<Machine> {
+ protected:
+  using T = typename Machine::T;
+
+  // The projection of x alone, by a step without forces or motion.
+  Points projected(const Strand& strand, const Points& x, double tolerance) {
+    StrandRun<Machine> run({strand}, {RootPose{}}, false);
+    make_forceless(run);
+    run.parameters.length_iterations = 8, run.parameters.length_tolerance = static_cast<T>(tolerance);
+    run.set(0, {x, Points::Zero(3, x.cols())});
+    run.step({RootPose{}}, 1.0 / 240);
+    strain_ = run.figure(0, kernels::kStrain), pieces_ = run.figure(0, kernels::kSubdivisions);
+    return run.get(0).position;
+  }
+  double strain_ = 0, pieces_ = 0;
+};
+TYPED_TEST_SUITE(KernelLengths, Machines, MachineNames);
+
+// A strand with its particles but the clamped ones displaced by up to `size` per axis.
+struct Displaced {
+  Strand strand;
+  Points x;
+};
+template <class T>
+Displaced displaced(std::mt19937& generator, int count, int clamped, double size) {
+  const Strand strand = rounded<T>(oracle::random_strand(generator, count, clamped).strand);
+  Points x = strand.rest;
+  x.rightCols(count - clamped) += oracle::random_points(generator, count - clamped, size);
+  return {strand, x.template cast<T>().template cast<double>()};
+}
+
+TYPED_TEST(KernelLengths, AreWithinTheToleranceAfterwards) {
+  std::mt19937 generator(4);
+  for (const int count : {1, 2, 3, 4, 15, 64})
+    for (const int clamped : {0, 1, 2}) {
+      if (clamped >= count) continue;
+      const auto [strand, x] = displaced<typename TypeParam::T>(generator, count, clamped, 0.001);
+      const Points end = this->projected(strand, x, 1e-5);
+      const double strain = oracle::worst_edge_strain(strand, end);
+      EXPECT_TRUE(strain <= 1.2e-5) << count << " particles: strain " << strain;
+      EXPECT_NEAR(this->strain_, strain, this->either(1e-12, 2e-6));
+      EXPECT_EQ(this->pieces_, 1);
+      EXPECT_EQ((end - x).leftCols(clamped).norm(), 0) << "a clamped particle moved";
+    }
+}
+
+// Successive projections differ from the exact minimiser at second order: a displacement of size d of
+// segments of length l ends within d^2 / l of it.
+TYPED_TEST(KernelLengths, AreRestoredByTheLeastDisplacementToSecondOrder) {
+  std::mt19937 generator(5);
+  for (int trial = 0; trial < 12; ++trial) {
+    const int count = 2 + 3 * trial, clamped = trial % 3;
+    if (clamped >= count) continue;
+    for (const double size : {1e-3, 2.5e-4}) {
+      const auto [strand, x] = displaced<typename TypeParam::T>(generator, count, clamped, size);
+      const double tolerance = this->either(1e-12, 1e-5);
+      const Points expected = oracle::project_lengths(strand, x), end = this->projected(strand, x, tolerance);
+      const double moved = (expected - x).colwise().norm().maxCoeff();
+      const double apart = (end - expected).colwise().norm().maxCoeff();
+      constexpr double kShortestSegment = 0.005;
+      EXPECT_TRUE(apart <= 2 * moved * moved / kShortestSegment + this->either(1e-12, 1e-6))
+          << count << " particles displaced by " << size << ": " << apart << " m apart, moved " << moved;
+    }
+  }
+}
+
+TYPED_TEST(KernelLengths, KeepTheMomentumOfAFreeStrand) {
+  std::mt19937 generator(6);
+  for (const int count : {2, 3, 9, 40}) {
+    const auto [strand, x] = displaced<typename TypeParam::T>(generator, count, 0, 0.002);
+    const Points moved = this->projected(strand, x, this->either(1e-12, 1e-5)) - x;
+    EXPECT_GT(moved.norm(), 1e-4);
+    const double drift = moved.rowwise().sum().norm();
+    EXPECT_TRUE(drift <= this->either(1e-15, 1e-7) * count) << "sum of displacements " << drift << " m";
+  }
+}
+
+// With forces: the step is the reference's step, then its successive projections, then the velocities'
+// correction.
+TYPED_TEST(KernelLengths, FollowTheStepAndCorrectTheVelocities) {
+  using T = typename TypeParam::T;
+  std::mt19937 generator(7);
+  for (const int clamped : {0, 1, 2}) {
+    RandomStrand random = oracle::random_strand(generator, 20, clamped);
+    random.strand = rounded<T>(random.strand);
+    preload_gravity(random.strand, random.step.before);
+    StrandRun<TypeParam> run({random.strand}, {random.step.before}, true);
+    run.parameters.length_iterations = 8, run.parameters.length_tolerance = T(1e-4);
+    run.set(0, random.state);
+    random.state = run.get(0), random.step.h = static_cast<T>(random.step.h);
+    run.step({random.step.after}, random.step.h);
+
+    const oracle::State solved = advance(random.strand, random.state, random.step);
+    int iterations = 0;
+    const Points lengths =
+        oracle::project_lengths_successively(random.strand, solved.position, 1e-4, 8, &iterations);
+    const oracle::State expected = with_projected(solved, lengths, random.step.h), end = run.get(0);
+    const double apart = (end.position - expected.position).norm();
+    const double faster = (end.velocity - expected.velocity).norm();
+    EXPECT_TRUE(apart <= this->either(1e-12, 5e-6)) << "positions are " << apart << " m apart";
+    EXPECT_TRUE(faster <= this->either(1e-10, 2e-3)) << "velocities are " << faster << " m/s apart";
+    EXPECT_EQ(run.figure(0, kernels::kIterations), iterations);
+    EXPECT_EQ(run.figure(0, kernels::kSubdivisions), 1);
+  }
+}
+
+// Legal states without a direction: nothing divides by zero, and what has lengths gets them back.
+TYPED_TEST(KernelLengths, StayFiniteInDegenerateStrands) {
+  const auto line = [](const std::vector<double>& along) {
+    Points x = Points::Zero(3, static_cast<Eigen::Index>(along.size()));
+    for (std::size_t i = 0; i < along.size(); ++i) x(0, static_cast<Eigen::Index>(i)) = 0.01 * along[i];
+    return x;
+  };
+  struct Case {
+    const char* name;
+    Points rest, x;
+    bool restorable;
+  };
+  const std::vector<Case> cases = {
+      {"one particle", line({0}), line({0}), true},
+      {"two particles", line({0, 1}), line({0, 1.2}), true},
+      {"three particles", line({0, 1, 2}), line({0, 1.2, 1.9}), true},
+      {"straight and stretched", line({0, 1, 2, 3, 4, 5}), line({0, 1.1, 2.2, 3.3, 4.4, 5.5}), true},
+      {"folded on itself", line({0, 1, 2, 3, 4, 5}), line({0, 1.1, 0.1, 1.2, 0.2, 1.3}), true},
+      {"repeated root point", line({0, 0, 1, 2}), line({0, 0, 1.1, 2.2}), true},
+      {"repeated points within", line({0, 1, 1, 1, 2}), line({0, 1.1, 1.1, 1.1, 2.2}), true},
+      {"all in one place", line({0, 1, 2, 3}), line({0, 0, 0, 0}), false},
+      {"no length at all", line({0, 0, 0, 0}), line({0, 0, 0, 0}), true},
+  };
+  for (const Case& c : cases)
+    for (const int clamped : {0, 1, 2}) {
+      SCOPED_TRACE(c.name);
+      Strand strand = oracle::make_strand(c.rest, {});
+      strand.clamped = clamped;
+      StrandRun<TypeParam> run({strand}, {RootPose{}}, false);
+      run.parameters.length_iterations = 8;
+      run.set(0, {c.x, Points::Zero(3, c.x.cols())});
+      for (int k = 0; k < 10; ++k) run.step({RootPose{}}, 1.0 / 240);
+      const oracle::State end = run.get(0);
+      EXPECT_TRUE(end.position.allFinite() && end.velocity.allFinite());
+      EXPECT_EQ(run.figure(0, kernels::kDiverged), 0);
+      if (c.restorable) EXPECT_TRUE(oracle::worst_edge_strain(strand, end.position) <= 1.2e-4);
+    }
+}
+
+struct Shaken {
+  double mean_iterations = 0, most_iterations = 0, strain = 0, most_pieces = 0;
+};
+template <class Machine>
+Shaken violently_shaken(int substeps, int cap) {
+  const Strand strand = oracle::helix_strand({});
+  StrandRun<Machine> run({strand}, {oracle::kViolentShake.at(0)}, true);
+  run.parameters.length_iterations = cap;
+  Shaken figures;
+  const int steps = oracle::kRestSteps * substeps;
+  for (int k = 1; k <= steps; ++k) {
+    const double h = oracle::kHelixStep / substeps;
+    run.step({oracle::kViolentShake.at(k * h)}, h);
+    const double iterations = run.figure(0, kernels::kIterations),
+                 pieces = run.figure(0, kernels::kSubdivisions);
+    figures.mean_iterations += iterations / steps;
+    if (pieces == 1) figures.most_iterations = std::max(figures.most_iterations, iterations);
+    figures.most_pieces = std::max(figures.most_pieces, pieces);
+    figures.strain = oracle::larger(figures.strain, oracle::worst_edge_strain(strand, run.get(0).position));
+  }
+  return figures;
+}
+
+TYPED_TEST(KernelLengths, NeedFewIterationsInAViolentShake) {
+  const Shaken fine = violently_shaken<TypeParam>(4, 8), coarse = violently_shaken<TypeParam>(1, 8);
+  EXPECT_TRUE(fine.mean_iterations > 1.5 && fine.mean_iterations < 2.1) << fine.mean_iterations;
+  EXPECT_LE(fine.most_iterations, 8);
+  EXPECT_TRUE(fine.strain <= 1.01e-4) << fine.strain;
+  EXPECT_TRUE(coarse.mean_iterations > 2 && coarse.mean_iterations < 3.5) << coarse.mean_iterations;
+  EXPECT_TRUE(coarse.strain <= 1.01e-4) << coarse.strain;
+}
+
+TYPED_TEST(KernelLengths, TakeMoreSubstepsWhereTheCapIsHit) {
+  const Shaken capped = violently_shaken<TypeParam>(1, 2);
+  EXPECT_GT(capped.most_pieces, 1);
+  EXPECT_LE(capped.most_pieces, 16);
+  EXPECT_TRUE(capped.strain <= 1e-3) << capped.strain;
+}
+
+}  // namespace
+}  // namespace ringlet::kernels_testing

@@ -1,0 +1,166 @@
+// The solid response of one particle against the reference's arithmetic, and what must not pass through a
+// solid.
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "kernels_support.h"
+#include "level_set_support.h"
+
+namespace ringlet::kernels_testing {
+namespace {
+
+using Eigen::Vector3d;
+using oracle::Particle;
+using oracle::Points;
+
+constexpr double kStep = 1.0 / 240;
+
+// A block whose top is at y = 0.
+const MeshSolid& block() {
+  static const MeshSolid solid(box({-0.08, -0.06, -0.08}, {0.08, 0, 0.08}, 4), 0.006);
+  return solid;
+}
+
+template <class Machine>
+class KernelResponse : public OnMachine<Machine> {
+ protected:
+  using T = typename Machine::T;
+
+  // A strand's free particle, `particle` before the advance, after one contact stage; its root is 5 mm above
+  // the place it comes to.
+  Particle respond(const kernels::SolidView& solid, const Particle& particle, double h = kStep) {
+    const Vector3d ahead = particle.position + h * particle.velocity;
+    const RootPose root{oracle::Mat3::Identity(), ahead + Vector3d(0, 0.005, 0)};
+    Points rest(3, 2);
+    rest << Vector3d::Zero(), Vector3d(0, -0.005, 0);
+    StrandRun<Machine> run({oracle::make_strand(rest, {})}, {root}, false);
+    oracle::State state = run.get(0);
+    state.position.col(1) = ahead, state.velocity.col(1) = particle.velocity;
+    run.set(0, state);
+    run.parameters.step = static_cast<T>(h);
+    run.collide({solid});
+    touched_ = run.contact_figure(0, kernels::kTouched) > 0;
+    state = run.get(0);
+    EXPECT_EQ(state.velocity.col(0).norm(), 0);
+    return {state.position.col(1), state.velocity.col(1)};
+  }
+  void expect_same(const Particle& measured, const Particle& expected) {
+    EXPECT_TRUE((measured.position - expected.position).norm() <= this->either(2e-8, 3e-7))
+        << measured.position.transpose() << " instead of " << expected.position.transpose();
+    EXPECT_TRUE((measured.velocity - expected.velocity).norm() <= this->either(1e-5, 1e-4))
+        << measured.velocity.transpose() << " instead of " << expected.velocity.transpose();
+  }
+  bool touched_ = false;
+};
+TYPED_TEST_SUITE(KernelResponse, Machines, MachineNames);
+
+TYPED_TEST(KernelResponse, HasTheFrictionCone) {
+  const Particle falling{{0.01, 0.004, -0.02}, {3, -2, 0}};
+  const struct { double friction, slides; } cases[] = {{0, 3}, {0.5, 2}, {1, 1}, {1.5, 0}, {10, 0}};
+  for (const auto& c : cases) {
+    const Particle after = this->respond(block().view(c.friction), falling);
+    this->expect_same(after, {falling.position + kStep * Vector3d(c.slides, 0, 0), {c.slides, 0, 0}});
+  }
+}
+
+TYPED_TEST(KernelResponse, LeavesASeparatingParticlesVelocityAndPushesItOut) {
+  const Vector3d velocity(1, 0.5, 0);
+  const Particle after = this->respond(block().view(), {{0, -0.005, 0}, velocity});
+  this->expect_same(after, {{kStep * 1, 0, 0}, velocity});
+}
+
+TYPED_TEST(KernelResponse, LeavesWhatIsOutsideAlone) {
+  const Particle outside{{0, 0.004, 0}, {2, -0.5, 1}};
+  this->expect_same(this->respond(block().view(), outside),
+                    {outside.position + kStep * outside.velocity, outside.velocity});
+  EXPECT_FALSE(this->touched_);
+}
+
+TYPED_TEST(KernelResponse, IsCarriedByAMovingSolid) {
+  const Vector3d carried(0.3, 0.9, -0.6);
+  kernels::SolidView solid = block().view(0.5);
+  for (int c = 0; c < 3; ++c) solid.translation_before[c] = -kStep * carried[c];
+  std::mt19937 generator(10);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  for (int trial = 0; trial < 200; ++trial) {
+    const Particle particle{
+        {0.02 * uniform(generator), 0.001 * uniform(generator), 0.02 * uniform(generator)},
+        {uniform(generator), -1 + 2 * uniform(generator), uniform(generator)}};
+    const oracle::Solid expected = oracle::half_space({0, 0, 0}, {0, 1, 0}, carried);
+    this->expect_same(this->respond(solid, particle), oracle::solid_response(expected, 0.5, particle, kStep));
+  }
+}
+
+// On a sphere of small facets: within what a neighbouring facet's normal would change, and never left inside.
+TYPED_TEST(KernelResponse, FollowsTheReferenceOnASphere) {
+  constexpr double kRadius = 0.06, kFacetAngle = 0.08;
+  static const MeshSolid sphere(icosphere(kRadius, 4), 0.006);
+  const oracle::MeshDistance mesh(sphere.surface.vertices, sphere.surface.triangles);
+  const oracle::Solid expected = oracle::sphere({0, 0, 0}, kRadius);
+  std::mt19937 generator(11);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  int touched = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    const Vector3d out = Vector3d(uniform(generator), uniform(generator), uniform(generator)).normalized();
+    const Particle particle{(kRadius + 0.001 * uniform(generator)) * out,
+                            Vector3d(uniform(generator), uniform(generator), uniform(generator)) - out};
+    if (!(expected.distance(particle.position + kStep * particle.velocity) < -1e-4)) continue;
+    ++touched;
+    const Particle after = this->respond(sphere.view(0.3), particle);
+    const Particle reference = oracle::solid_response(expected, 0.3, particle, kStep);
+    const double faster = (after.velocity - reference.velocity).norm();
+    EXPECT_TRUE(faster <= 2 * kFacetAngle * particle.velocity.norm()) << faster << " m/s apart";
+    EXPECT_TRUE((after.position - reference.position).norm() <= 5e-4);
+    EXPECT_TRUE(mesh.signed_distance(after.position) >= -this->either(2e-7, 1e-6));
+  }
+  EXPECT_GT(touched, 50);
+}
+
+TYPED_TEST(KernelResponse, ExcludesRoots) {
+  Points rest(3, 3);
+  rest << Vector3d::Zero(), Vector3d(0, 0.004, 0), Vector3d(0, 0.008, 0);
+  for (const int clamped : {1, 2}) {
+    oracle::Strand strand = oracle::make_strand(rest, {});
+    strand.clamped = clamped;
+    StrandRun<TypeParam> run({strand}, {RootPose{oracle::Mat3::Identity(), {0, -0.006, 0}}}, false);
+    const oracle::State before = run.get(0);
+    run.parameters.step = kStep;
+    run.collide({block().view()});
+    const oracle::State after = run.get(0);
+    EXPECT_EQ((after.position - before.position).leftCols(clamped).norm(), 0);
+    if (clamped == 1) EXPECT_NEAR(after.position(1, 1), 0, 1e-7);
+  }
+}
+
+// 0.42 m in one substep, through a plate of 2 cm.
+TYPED_TEST(KernelResponse, StopsABulletAtAThinPlate) {
+  static const MeshSolid plate(box({-0.08, -0.02, -0.08}, {0.08, 0, 0.08}, 4), 0.004);
+  for (const double start : {0.005, 0.1, 0.3, 0.37}) {
+    const Particle after = this->respond(plate.view(), {{0, start, 0}, {0, -100, 0}});
+    EXPECT_TRUE(after.position.y() >= -1e-6) << "from " << start << " to " << after.position.y();
+    EXPECT_TRUE(std::abs(after.velocity.y()) <= 1e-3) << after.velocity.y();
+  }
+}
+
+// A segment of 12 cm falls on a rod as thick as a finger that lies halfway between its particles.
+TYPED_TEST(KernelResponse, KeepsAThinRodFromPassingBetweenParticles) {
+  static const MeshSolid rod(box({0.052, -0.028, -0.04}, {0.068, -0.012, 0.04}, 4), 0.004);
+  Points rest(3, 3);
+  rest << Vector3d(-0.01, 0, 0), Vector3d::Zero(), Vector3d(0.12, 0, 0);
+  StrandRun<TypeParam> run({oracle::make_strand(rest, {1e6, 1e6, 1e6, 0, 0})}, {RootPose{}}, false);
+  run.parameters.length_iterations = 8;
+  constexpr double kRodMiddle = 0.06, kRodCentre = -0.02;
+  for (int k = 0; k < 240; ++k) {
+    run.step({RootPose{}}, kStep);
+    run.collide({rod.view()});
+    const Points x = run.get(0).position;
+    const double t = (kRodMiddle - x(0, 1)) / (x(0, 2) - x(0, 1));
+    const double height = x(1, 1) + t * (x(1, 2) - x(1, 1));
+    ASSERT_TRUE(t > 0 && t < 1 && height > kRodCentre) << "at y = " << height << " after " << k << " steps";
+  }
+  EXPECT_LT(run.get(0).position(1, 2), -0.02);  // it lies on the rod
+}
+
+}  // namespace
+}  // namespace ringlet::kernels_testing

@@ -1,0 +1,26 @@
+#include "kernels_support.h"
+
+#include "kernels/strand/strand_step.h"
+
+namespace ringlet::kernels_testing {
+
+template <class T>
+const kernels::KernelTable<T>& scalar_kernels() {
+  static const kernels::KernelTable<T> table = {
+      [](const kernels::StrandStep<T>& step, int begin, int end, T* scratch) {
+        for (int batch = begin; batch < end; ++batch)
+          for (int lane = 0; lane < kernels::kLanes; ++lane)
+            kernels::step_strands<T>(step, batch, lane, scratch, 1);
+      },
+      [](const kernels::ContactStep<T>& step, int begin, int end, T* scratch) {
+        for (int batch = begin; batch < end; ++batch)
+          for (int lane = 0; lane < kernels::kLanes; ++lane)
+            kernels::collide_strands<T>(step, batch, lane, scratch, 1);
+      }};
+  return table;
+}
+
+template const kernels::KernelTable<float>& scalar_kernels();
+template const kernels::KernelTable<double>& scalar_kernels();
+
+}  // namespace ringlet::kernels_testing

@@ -203,7 +203,6 @@ RINGLET_FUNCTION void push_segments(const ContactPack<R>& s, const LaneContact<T
 template <class R, class T>
 RINGLET_FUNCTION void push_out(const ContactPack<R>& s, const LaneContact<T>& contact, int lane, int first,
                                int count, LaneFigures<T>& figures) {
-  push_segments(s, contact, lane, first, count, figures);
   for (int i = first; i < count; ++i) {
     const Vector3<T> x = s.get(s.position, i, lane);
     const SurfaceSample<T> at = contact.sample(x);
@@ -243,10 +242,14 @@ struct ContactLane {
       push_segments(pack, contact, in_pack, first(), count, figures);
     }
   }
-  RINGLET_FUNCTION void push(LaneFigures<T>& figures) const {
+  // Segments too in the early rounds only: one that is threaded through an ear has ends on both sides, which
+  // no push could reconcile with its length.
+  RINGLET_FUNCTION void push(LaneFigures<T>& figures, bool segments) const {
     figures.pushed = T(0);
-    for (int solid = 0; solid < step.solid_count; ++solid)
+    for (int solid = 0; solid < step.solid_count; ++solid) {
+      if (segments) push_segments(pack, against(solid), in_pack, first(), count, figures);
       push_out(pack, against(solid), in_pack, first(), count, figures);
+    }
   }
 };
 
@@ -281,22 +284,24 @@ RINGLET_FUNCTION void collide_strands(const ContactStep<Scalar<R>>& step, int ba
     any_open = any_open || figures[l].touched;
   }
   const R count = load<R>(step.batches.count + batch * kLanes + lane);
-  const ProjectedStrand<R> lengths{pack.position,
-                                   pack.velocity,
-                                   R(T(1) / step.step),
-                                   step.batches.rest_length + base,
-                                   kLanes,
-                                   pack.normal,
-                                   pack.projection,
-                                   stride,
-                                   n,
-                                   count,
-                                   step.clamped};
+  ProjectedStrand<R> lengths{pack.position,
+                             pack.velocity,
+                             R(T(1) / step.step),
+                             step.batches.rest_length + base,
+                             kLanes,
+                             pack.normal,
+                             pack.projection,
+                             stride,
+                             n,
+                             count,
+                             step.clamped};
   for (int round = 0; any_open && step.length_iterations > 0 && round < step.rounds; ++round) {
     for (int l = 0; l < kWidth; ++l) open_now[l] = open[l];
+    // In turn: along the surface, and freely, for a particle that its lengths pull off the surface.
+    lengths.normal = round % 2 == 0 ? pack.normal : nullptr;
     project_lengths(lengths, R(step.length_tolerance), step.length_iterations, load<R>(open_now) > R(0));
     for (int l = 0; l < kWidth; ++l)
-      if (open[l] > T(0)) at_lane(l).push(figures[l]), rounds[l] += T(1);
+      if (open[l] > T(0)) at_lane(l).push(figures[l], 2 * round < step.rounds), rounds[l] += T(1);
     store(left, eliminate_lengths(lengths));
     any_open = false;
     for (int l = 0; l < kWidth; ++l) {

@@ -1,7 +1,6 @@
 // Where the kernels run: on the CPU's threads, or on a CUDA device.
 #pragma once
 #include <memory>
-#include <optional>
 #include <string>
 
 #include "kernels/solid/solid_view.h"
@@ -14,8 +13,9 @@ struct ContactStep;
 
 namespace ringlet::effects {
 
-// Runs kernels over all batches. The state given to the constructor's model lives with the executor while it
-// steps: `fetch` brings it back to the host, `submit` takes the host's.
+// Runs kernels over all batches. The state of the model that it was made for lives with the executor while it
+// steps: `fetch` brings it back to the host, `submit` takes the host's; where the roots go is told by
+// `submit_roots`, which holds until the next. The pointers in a step are the host's. Throws Error{kDevice}.
 template <class T>
 class Executor {
  public:
@@ -23,9 +23,11 @@ class Executor {
   virtual std::string backend() const = 0;          // cpu, cuda
   virtual std::string instruction_set() const = 0;  // avx512, avx2, generic, sm_90, ...
   virtual void submit(const state::StrandState<T>& state) = 0;
+  virtual void submit_roots(const state::StrandState<T>& state) = 0;
   virtual void fetch(state::StrandState<T>& state) = 0;
   virtual void strand_step(const kernels::StrandStep<T>& step) = 0;
-  virtual void contact_step(const kernels::ContactStep<T>& step) = 0;
+  // `frame`: the number of the frame stepped to. A deforming solid's level sets are the same throughout it.
+  virtual void contact_step(const kernels::ContactStep<T>& step, int frame) = 0;
 };
 
 // `instruction_set`: avx512, avx2 or generic; empty: the widest this processor has. Throws Error{kUsage} for
@@ -33,5 +35,11 @@ class Executor {
 template <class T>
 std::unique_ptr<Executor<T>> make_cpu_executor(const state::StrandModel<T>& model,
                                                const std::string& instruction_set);
+
+// On the first CUDA device. Throws Error{kDevice} where there is none, or the program was built without CUDA.
+std::unique_ptr<Executor<float>> make_cuda_executor(const state::StrandModel<float>& model);
+
+// The device that `make_cuda_executor` would take. Throws Error{kDevice}, saying why, where there is none.
+std::string cuda_device_name();
 
 }  // namespace ringlet::effects

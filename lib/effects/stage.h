@@ -10,8 +10,9 @@
 
 namespace ringlet::effects {
 
-// One substep: from `time_before` to `time` [s], h = `step`.
+// One substep on the way to `frame`: from `time_before` to `time` [s], h = `step`.
 struct Substep {
+  int frame;
   double time_before, time, step;
   bool last_of_frame;
 };

@@ -62,6 +62,33 @@ const char* axis_name(scene::Axis axis) {
   return axis == scene::Axis::kX ? "x" : axis == scene::Axis::kY ? "y" : "z";
 }
 
+// Left to itself the program steps in float on the GPU where there is one, unless an instruction set of the
+// CPU was asked for. Throws Error{kDevice} for a GPU that is asked for and not there.
+Backend choose_backend(const Options& options) {
+  const bool cpu_only = options.precision == Precision::kDouble || !options.instruction_set.empty();
+  if (options.backend == Backend::kCpu || (options.backend == Backend::kAuto && cpu_only))
+    return Backend::kCpu;
+  try {
+    log_info(fmt::format("steps on {}", effects::cuda_device_name()));
+    return Backend::kCuda;
+  } catch (const Error& error) {
+    if (options.backend == Backend::kCuda) throw;
+    log_debug(fmt::format("steps on the CPU: {}", error.what()));
+    return Backend::kCpu;
+  }
+}
+
+std::unique_ptr<effects::Executor<float>> make_executor(const state::StrandModel<float>& model,
+                                                        const Options& options) {
+  if (options.backend == Backend::kCuda) return effects::make_cuda_executor(model);
+  return effects::make_cpu_executor(model, options.instruction_set);
+}
+
+std::unique_ptr<effects::Executor<double>> make_executor(const state::StrandModel<double>& model,
+                                                         const Options& options) {
+  return effects::make_cpu_executor(model, options.instruction_set);
+}
+
 template <class T>
 class TypedSimulation : public Simulation {
  public:
@@ -70,7 +97,7 @@ class TypedSimulation : public Simulation {
         world_(build_world(scene_)),
         model_(strand_input<T>(scene_, world_)),
         state_(model_.layout),
-        executor_(effects::make_cpu_executor<T>(model_, options.instruction_set)),
+        executor_(make_executor(model_, options)),
         before_(world_.strands.size()),
         now_(world_.strands.size()) {
     stages_.push_back(effects::make_strand_stage<T>(scene_, model_, state_));
@@ -178,6 +205,7 @@ void TypedSimulation<T>::move_roots(double time) {
   tbb::parallel_for(std::size_t{0}, now_.size(), [&](std::size_t strand) {
     state::set_root_motion(state_, model_.layout, strand, before_[strand], now_[strand]);
   });
+  executor_->submit_roots(state_);
 }
 
 template <class T>
@@ -195,7 +223,8 @@ void TypedSimulation<T>::step_frame(int frame, effects::FrameReport& report, Sta
   seconds.assign(1, {"roots", 0.0});
   for (const auto& stage : stages_) seconds.emplace_back(stage->name(), 0.0);
   for (int s = 0; s < substeps; ++s) {
-    const effects::Substep substep{time_of(frame - 1, s), time_of(frame - 1, s + 1), step, s + 1 == substeps};
+    const effects::Substep substep{frame, time_of(frame - 1, s), time_of(frame - 1, s + 1), step,
+                                   s + 1 == substeps};
     Timer timer;
     if (!still) move_roots(substep.time);
     seconds[0].second += timer.seconds();
@@ -330,13 +359,14 @@ bool TypedSimulation<T>::run(const FrameRange& range, state::FrameSink& sink, co
 }  // namespace
 
 std::unique_ptr<Simulation> Simulation::create(const scene::Scene& scene, const Options& options) {
-  if (options.precision == Precision::kDouble) {
-    if (options.backend == Backend::kCuda)
-      throw Error(ErrorKind::kUsage, "--precision", "the CUDA backend steps in single precision only",
-                  "use --backend cpu for double");
-    return std::make_unique<TypedSimulation<double>>(scene, options);
-  }
-  return std::make_unique<TypedSimulation<float>>(scene, options);
+  if (options.precision == Precision::kDouble && options.backend == Backend::kCuda)
+    throw Error(ErrorKind::kUsage, "--precision", "the CUDA backend steps in single precision only",
+                "use --backend cpu for double");
+  Options chosen = options;
+  chosen.backend = choose_backend(options);
+  if (options.precision == Precision::kDouble)
+    return std::make_unique<TypedSimulation<double>>(scene, chosen);
+  return std::make_unique<TypedSimulation<float>>(scene, chosen);
 }
 
 }  // namespace ringlet::pipeline

@@ -52,7 +52,7 @@ class ContactStage : public Stage<T> {
     step.length_iterations = project ? lengths->max_iterations : 0;
     step.length_tolerance = project ? static_cast<T>(lengths->tolerance) : T(0);
     step.figures = figures_.data();
-    executor.contact_step(step);
+    executor.contact_step(step, substep.frame);
     gather(substep, report);
   }
 

@@ -1,0 +1,86 @@
+#include <fmt/format.h>
+
+#include "core/error.h"
+#include "effects/executor.h"
+#include "kernels/launch/cuda_kernels.h"
+#include "kernels/solid/response.h"
+
+namespace ringlet::effects {
+namespace {
+
+using kernels::kLanes;
+
+// What the device refuses leaves the library as an error of the device.
+template <class Call>
+auto on_device(Call&& call) {
+  try {
+    return call();
+  } catch (const kernels::CudaError& error) {
+    throw Error(ErrorKind::kDevice, "", error.what(), "--backend cpu does without the device");
+  }
+}
+
+kernels::CudaDevice device_or_error() {
+  std::string why_not;
+  if (const auto device = kernels::find_cuda_device(&why_not)) return *device;
+  throw Error(ErrorKind::kDevice, "--backend cuda", why_not, "use --backend cpu or auto");
+}
+
+// The strands live on the device; of each step only the figures come back.
+class CudaExecutor : public Executor<float> {
+ public:
+  explicit CudaExecutor(const state::StrandModel<float>& model)
+      : device_(device_or_error()),
+        lanes_(static_cast<std::size_t>(model.layout.batches()) * kLanes),
+        strands_(
+            on_device([&] { return kernels::make_cuda_strands(model.view(), kernels::CudaTiming::kOff); })) {}
+
+  std::string backend() const override { return "cuda"; }
+  std::string instruction_set() const override {
+    return fmt::format("sm_{}{}", device_.major, device_.minor);
+  }
+
+  void submit(const state::StrandState<float>& state) override {
+    on_device([&] { strands_->upload_state(state.position, state.velocity); });
+  }
+  void submit_roots(const state::StrandState<float>& state) override {
+    on_device([&] { strands_->upload_roots(state.root_motion, state.root_points); });
+  }
+  void fetch(state::StrandState<float>& state) override {
+    on_device([&] { strands_->download_state(state.position, state.velocity); });
+  }
+
+  void strand_step(const kernels::StrandStep<float>& step) override {
+    on_device([&] {
+      strands_->strand_step(step.parameters);
+      strands_->download_figures({step.figures, lanes_ * kernels::kFigures}, {});
+    });
+  }
+
+  void contact_step(const kernels::ContactStep<float>& step, int frame) override {
+    on_device([&] {
+      if (!collides_known_) strands_->upload_collides({step.collides, lanes_});
+      collides_known_ = true;
+      strands_->upload_solids({step.solids, static_cast<std::size_t>(step.solid_count)}, frame);
+      strands_->contact_step(
+          {step.step, step.clamped, step.rounds, step.length_iterations, step.length_tolerance});
+      strands_->download_figures({}, {step.figures, lanes_ * kernels::kContactFigures});
+    });
+  }
+
+ private:
+  kernels::CudaDevice device_;
+  std::size_t lanes_;
+  std::unique_ptr<kernels::CudaStrands> strands_;
+  bool collides_known_ = false;  // which strands collide is the same in every step of a run
+};
+
+}  // namespace
+
+std::string cuda_device_name() { return device_or_error().name; }
+
+std::unique_ptr<Executor<float>> make_cuda_executor(const state::StrandModel<float>& model) {
+  return std::make_unique<CudaExecutor>(model);
+}
+
+}  // namespace ringlet::effects

@@ -153,7 +153,9 @@ TYPED_TEST(KernelLengths, StayFiniteInDegenerateStrands) {
       const oracle::State end = run.get(0);
       EXPECT_TRUE(end.position.allFinite() && end.velocity.allFinite());
       EXPECT_EQ(run.figure(0, kernels::kDiverged), 0);
-      if (c.restorable) EXPECT_TRUE(oracle::worst_edge_strain(strand, end.position) <= 1.2e-4);
+      if (c.restorable) {
+        EXPECT_TRUE(oracle::worst_edge_strain(strand, end.position) <= 1.2e-4);
+      }
     }
 }
 

@@ -129,7 +129,9 @@ TYPED_TEST(KernelResponse, ExcludesRoots) {
     run.collide({block().view()});
     const oracle::State after = run.get(0);
     EXPECT_EQ((after.position - before.position).leftCols(clamped).norm(), 0);
-    if (clamped == 1) EXPECT_NEAR(after.position(1, 1), 0, 1e-7);
+    if (clamped == 1) {
+      EXPECT_NEAR(after.position(1, 1), 0, 1e-7);
+    }
   }
 }
 

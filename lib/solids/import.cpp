@@ -10,6 +10,7 @@
 #include <assimp/Importer.hpp>
 #include <map>
 #include <set>
+#include <tuple>
 
 #include "core/error.h"
 #include "core/log.h"
@@ -82,8 +83,9 @@ class RigBuilder {
     aiVector3D scale, translate;
     aiQuaternion rotate;
     source.mTransformation.Decompose(scale, rotate, translate);
-    rig_.nodes.push_back(
-        {parent, -1, convert(source.mTransformation), {convert(translate), convert(rotate), convert(scale)}});
+    const Affine rest = convert(source.mTransformation);
+    const NodePose pose{convert(translate), convert(rotate), convert(scale)};
+    rig_.nodes.push_back({parent, -1, rest, pose, rest, pose});
     node_sources_.push_back(&source);
     if (!node_by_name_.try_emplace(source.mName.C_Str(), index).second)
       ambiguous_names_.insert(source.mName.C_Str());
@@ -214,12 +216,12 @@ class RigBuilder {
     }
   }
 
-  std::int32_t joint(int node, const Affine& offset) {
+  std::int32_t joint(int node, const Affine& offset, int mesh_node) {
     std::array<double, 12> coefficients;
     std::copy_n(offset.data(), coefficients.size(), coefficients.begin());
-    const auto [found, is_new] =
-        joint_index_.try_emplace({node, coefficients}, static_cast<std::int32_t>(rig_.joints.size()));
-    if (is_new) rig_.joints.push_back({node, offset});
+    const auto [found, is_new] = joint_index_.try_emplace({node, mesh_node, coefficients},
+                                                          static_cast<std::int32_t>(rig_.joints.size()));
+    if (is_new) rig_.joints.push_back({node, offset, mesh_node});
     return found->second;
   }
 
@@ -237,11 +239,12 @@ class RigBuilder {
           fail(fmt::format("mesh \"{}\": its joint \"{}\" is no node of the file", mesh.mName.C_Str(),
                            bone.mName.C_Str()),
                "give every joint a name of its own");
-        influences[weight.mVertexId].emplace_back(joint(node, convert(bone.mOffsetMatrix)), weight.mWeight);
+        influences[weight.mVertexId].emplace_back(joint(node, convert(bone.mOffsetMatrix), node_index),
+                                                  weight.mWeight);
       }
     }
     for (auto& vertex : influences) {
-      if (vertex.empty()) vertex.emplace_back(joint(node_index, Affine::Identity()), 1.0);
+      if (vertex.empty()) vertex.emplace_back(joint(node_index, Affine::Identity(), -1), 1.0);
       std::sort(vertex.begin(), vertex.end());
       double sum = 0;
       for (const auto& [index, weight] : vertex) sum += weight;
@@ -279,7 +282,7 @@ class RigBuilder {
   std::vector<const aiNode*> node_sources_;
   std::map<std::string, int> node_by_name_;
   std::set<std::string> ambiguous_names_;
-  std::map<std::pair<int, std::array<double, 12>>, std::int32_t> joint_index_;
+  std::map<std::tuple<int, int, std::array<double, 12>>, std::int32_t> joint_index_;
 };
 
 // ---- Units --------------------------------------------------------------------------------------

@@ -1,10 +1,14 @@
 #include "solids/mesh.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <set>
 
 #include "core/error.h"
+#include "core/log.h"
+#include "solids/bind_pose.h"
 #include "solids/import.h"
 #include "solids/keyframes.h"
 #include "solids/rigid_fit.h"
@@ -64,6 +68,12 @@ struct AnimatedMesh::Impl {
       declared = mesh.declared;
       const Weld weld = find_weld(mesh.rig);
       rig = apply(std::move(mesh.rig), weld);
+      const double moved = rest_in_bind_pose(rig);
+      if (moved > 0)
+        log_debug(
+            fmt::format("{}: at rest the skin is in its bind pose, up to {:g} (file units) from where "
+                        "the nodes put it",
+                        desc.file.string(), moved));
     }
     units.linear() = file_to_scene(desc.file, declared, desc.units, scene_units);
     units.translation().setZero();

@@ -24,7 +24,9 @@ class AnimatedMesh {
   const std::vector<Triangle>& triangles() const;
   const std::vector<std::int32_t>& mesh_of_triangle() const;  // index into mesh_names
   const std::vector<std::string>& mesh_names() const;
-  const std::vector<Vec3>& rest_vertices() const;  // node transforms at rest, no clip, no keys
+  // No clip, no keys. Where a skin holds them: in its bind pose, which grooms are made on, whatever the
+  // joints' nodes hold; else by the node transforms.
+  const std::vector<Vec3>& rest_vertices() const;
 
   // Nothing moves; or every vertex moves by one rigid pose; or it deforms. Found by looking at the motion,
   // not guessed from the file's features (a skin whose joints move as one is rigid).

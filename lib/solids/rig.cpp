@@ -17,15 +17,21 @@ Affine compose(const NodePose& pose) {
 }
 
 Affine local_transform(const Rig& rig, const Node& node, RigTime time) {
-  if (node.channel < 0 || time.presence == 0) return node.rest;
-  const Channel& channel = rig.channels[static_cast<std::size_t>(node.channel)];
-  const NodePose& rest = node.rest_pose;
-  NodePose pose{channel.translate.empty() ? rest.translate : channel.translate.at(time.clip_time),
-                channel.rotate.empty() ? rest.rotate : channel.rotate.at(time.clip_time),
-                channel.scale.empty() ? rest.scale : channel.scale.at(time.clip_time)};
+  if (time.presence == 0) return node.start;
+  NodePose pose = node.rest_pose;
+  if (node.channel >= 0) {
+    const Channel& channel = rig.channels[static_cast<std::size_t>(node.channel)];
+    if (!channel.translate.empty()) pose.translate = channel.translate.at(time.clip_time);
+    if (!channel.rotate.empty()) pose.rotate = channel.rotate.at(time.clip_time);
+    if (!channel.scale.empty()) pose.scale = channel.scale.at(time.clip_time);
+  } else if (time.presence == 1 || node.start.matrix() == node.rest.matrix()) {
+    return node.rest;
+  }
   if (time.presence < 1) {
-    pose = {between(rest.translate, pose.translate, time.presence),
-            between(rest.rotate, pose.rotate, time.presence), between(rest.scale, pose.scale, time.presence)};
+    const NodePose& start = node.start_pose;
+    pose = {between(start.translate, pose.translate, time.presence),
+            between(start.rotate, pose.rotate, time.presence),
+            between(start.scale, pose.scale, time.presence)};
   }
   return compose(pose);
 }

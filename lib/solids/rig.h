@@ -34,16 +34,21 @@ struct Channel {
 };
 
 struct Node {
-  int parent;          // -1 at the root
-  int channel;         // -1: at rest throughout the clip
-  Affine rest;         // local, as the file has it
-  NodePose rest_pose;  // the same, taken apart
+  int parent;           // -1 at the root
+  int channel;          // -1: the clip leaves it as the file has it
+  Affine rest;          // local, as the file has it
+  NodePose rest_pose;   // the same, taken apart
+  Affine start;         // local, in the rig's rest pose: a skin's bind pose, else `rest`
+  NodePose start_pose;  // the same, taken apart
 };
 
 // Vertices follow node.global * offset.
 struct Joint {
   int node;
   Affine offset;
+  int mesh_node;  // that holds the skinned mesh; -1: no joint of a skin but the mesh's own node
+
+  bool skinned() const { return mesh_node >= 0; }
 };
 
 // Moves `vertices` by weight * delta before they are skinned.

@@ -135,6 +135,45 @@ TEST_F(MeshTest, ASkinThatMovesAsOneIsRigidAndABentOneDeforms) {
   EXPECT_EQ(turned.motion(), Motion::kRigid);
 }
 
+// A skin whose joint the file shows turned by 30 degrees: at rest it is as it was bound, with and without the
+// clip, and the clip goes its own way.
+TEST_F(MeshTest, ASkinRestsInItsBindPose) {
+  GltfText gltf;
+  const int p = gltf.floats("VEC3", 3, corner_floats_), i = gltf.indices(faces_);
+  const int joints = gltf.joints({0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0});
+  const int weights = gltf.floats("VEC4", 4, {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0});
+  std::vector<float> bind(16, 0.0f);
+  for (const int k : {0, 5, 10, 15}) bind[static_cast<std::size_t>(k)] = 1;
+  bind[12] = -5;  // bound at (5, 0, 0)
+  const int inverse_bind = gltf.floats("MAT4", 16, bind);
+  const int times = gltf.floats("SCALAR", 1, {0, 1});
+  const int turns = gltf.floats("VEC4", 4, {0, 0, 0, 1, 0, 0, kHalf, kHalf});
+  const auto file =
+      write("posed.gltf", gltf.text(fmt::format(R"(
+      "scene":0,"scenes":[{{"nodes":[0,1]}}],
+      "nodes":[{{"name":"body","mesh":0,"skin":0}},
+               {{"name":"root","translation":[5,0,0],"rotation":[0,0,0.25881904510,0.96592582629]}}],
+      "skins":[{{"joints":[1],"inverseBindMatrices":{}}}],
+      "meshes":[{{"primitives":[{{"attributes":{{"POSITION":{},"JOINTS_0":{},"WEIGHTS_0":{}}},"indices":{}}}]}}],
+      "animations":[{{"name":"turn","samplers":[{{"input":{},"output":{}}}],
+        "channels":[{{"sampler":0,"target":{{"node":1,"path":"rotation"}}}}]}}])",
+                                                inverse_bind, p, joints, weights, i, times, turns)));
+  const AnimatedMesh still(mesh_desc(file), kMetresYUp, kTwoSeconds);
+  EXPECT_EQ(still.motion(), Motion::kStill);
+  expect_near(still.rest_vertices(), corners_, 1e-6);
+
+  const AnimatedMesh mesh(mesh_desc(file, "turn"), kMetresYUp, {1, 49, 24, 12});
+  expect_near(mesh.rest_vertices(), corners_, 1e-6);
+  const auto turned = [&](double degrees) {
+    std::vector<Vec3> result;
+    for (const Vec3& v : corners_) result.push_back(Vec3(5, 0, 0) + turn_z(degrees) * (v - Vec3(5, 0, 0)));
+    return result;
+  };
+  expect_near(sample(mesh, -0.5), corners_, 1e-6);
+  expect_near(sample(mesh, 0), corners_, 1e-6);
+  expect_near(sample(mesh, 1), turned(90), 1e-5);
+}
+
 TEST_F(MeshTest, MorphTargetsAddTheirWeightedDisplacements) {
   GltfText gltf;
   const int p = gltf.floats("VEC3", 3, corner_floats_), i = gltf.indices(faces_);

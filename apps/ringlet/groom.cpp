@@ -12,10 +12,13 @@
 namespace ringlet::app {
 namespace {
 
-void write_groom(const std::filesystem::path& output, const groom::Strands& strands, scene::Axis up) {
+void check_output(const std::filesystem::path& output) {
   if (output.extension() != ".h5")
     throw Error(ErrorKind::kUsage, output.string(), "a groom is written as HDF5",
                 "give an output that ends in .h5");
+}
+
+void write_groom(const std::filesystem::path& output, const groom::Strands& strands, scene::Axis up) {
   groom::write(output, strands, up);
   fmt::print("wrote {}: {} strands, {} particles\n", output.string(), strands.size(), strands.particles());
 }
@@ -36,6 +39,7 @@ double metres_in(const std::string& unit) {
 }  // namespace
 
 int run_groom_grow(const GroomGrowOptions& options) {
+  check_output(options.output);
   const scene::Scene scene = scene::load(options.scene, {options.overrides});
   for (const scene::Groom& desc : scene.grooms) {
     if (!desc.grow || (options.groom && *options.groom != desc.name)) continue;
@@ -52,6 +56,7 @@ int run_groom_grow(const GroomGrowOptions& options) {
 }
 
 int run_groom_convert(const GroomConvertOptions& options) {
+  check_output(options.output);
   if (options.up != "x" && options.up != "y" && options.up != "z")
     throw Error(ErrorKind::kUsage, "--up", fmt::format("`{}` is no axis", options.up), "give x, y or z");
   const scene::Axis up = options.up == "x"   ? scene::Axis::kX

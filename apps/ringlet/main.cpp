@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <cstdio>
 #include <functional>
 #include <new>
 
@@ -182,7 +183,10 @@ int main(int argc, char** argv) {
   }
   set_log_level(verbose ? LogLevel::kDebug : quiet ? LogLevel::kWarning : LogLevel::kInfo);
   try {
-    return job();
+    const int code = job();
+    if (std::fflush(stdout) != 0)  // a report cut short must not pass for a whole one
+      throw Error(ErrorKind::kIo, "standard output", "cannot be written");
+    return code;
   } catch (const Error& error) {
     return report(error);
   } catch (const std::bad_alloc&) {

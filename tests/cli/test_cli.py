@@ -136,6 +136,18 @@ def test_cuda_without_a_device_ends_with_6(program, scene, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize("solids, tolerance", [("null", 1e-6), ('[{"source": "head", "resolution": 32}]', 1e-4)])
+def test_cuda_and_cpu_agree(program, scene, tmp_path, solids, tolerance):
+    options = ["--set", f"/effects/solids={solids}"]
+    result = run(program, "run", scene, "-o", tmp_path / "cuda", "--backend", "cuda", *options)
+    if result.returncode == 6:
+        pytest.skip(result.stderr.strip())
+    assert result.returncode == 0, result.stderr
+    assert run(program, "run", scene, "-o", tmp_path / "cpu", "--backend", "cpu", *options).returncode == 0
+    result = run(program, "compare", tmp_path / "cuda", tmp_path / "cpu", "--tolerance", tolerance)
+    assert result.returncode == 0, result.stdout
+
+
 def test_auto_without_a_device_says_nothing_of_it(program, scene):
     result = run(program, "plan", scene, env={"CUDA_VISIBLE_DEVICES": ""})
     assert result.returncode == 0 and "steps on" not in result.stderr

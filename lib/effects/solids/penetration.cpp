@@ -14,6 +14,10 @@ namespace {
 // see.
 constexpr double kClearance = 2e-5;
 
+// Strands shorter than this [m] cannot be deep in a solid that their root is not; their segments are no
+// longer than the rounding of contacts.
+constexpr double kShortest = 4e-4;
+
 struct Surface {
   const kernels::SolidView& solid;
 
@@ -68,6 +72,7 @@ struct StrandReport {
   std::int64_t inside = 0;
   double deepest = 0;
   bool buried = false;
+  bool too_short = false;
 };
 
 StrandReport inspect(const Surface& surface, std::span<const Vec3> points) {
@@ -81,6 +86,7 @@ StrandReport inspect(const Surface& surface, std::span<const Vec3> points) {
     report.deepest = std::max(report.deepest, -distance);
   }
   report.buried = -surface.at(points[0]).distance > length;
+  report.too_short = length < kShortest;
   return report;
 }
 
@@ -96,7 +102,7 @@ PenetrationReport resolve_penetration(scene::Penetration policy, const kernels::
     for (std::size_t s = range.begin(); s < range.end(); ++s) {
       const std::span<Vec3> strand = points.subspan(offsets[s], offsets[s + 1] - offsets[s]);
       reports[s] = inspect(surface, strand);
-      if (reports[s].buried) {
+      if (reports[s].buried || reports[s].too_short) {
         collides[s] = 0;
       } else if (policy == scene::Penetration::kPushOut) {
         push_out_strand(surface, strand);

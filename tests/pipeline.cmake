@@ -1,0 +1,1 @@
+ringlet_test(pipeline ringlet::pipeline ringlet::oracle TBB::tbb)

@@ -23,11 +23,12 @@ namespace {
 
 using oracle::MeshDistance;
 
-constexpr double kInside = 0.75;          // winding number; about a half in the openings of an open mesh
-constexpr double kDepth = 0.5e-3;         // [m] deepest that a particle may end a frame inside the mesh
-constexpr double kFreeStrain = 1e-3;      // of strands that no solid moved
-constexpr double kMovedStrain = 1e-2;     // of those that one did, 99.9th percentile
-constexpr double kStrainRounding = 2e-5;  // of an edge whose ends are written in single precision
+constexpr double kInside = 0.75;       // winding number; about a half in the openings of an open mesh
+constexpr double kDepth = 0.5e-3;      // [m] deepest that a particle may end a frame inside the mesh
+constexpr double kFreeStrain = 1e-3;   // of strands that no solid moved
+constexpr double kMovedStrain = 1e-2;  // of those that one did, 99.9th percentile
+constexpr double kRounding = 4e-7;     // of a length between points in single precision, of their coordinates
+constexpr double kStrainRounding = 2e-5;
 
 std::filesystem::path data_folder() {
   const char* named = std::getenv("RINGLET_DATA");
@@ -120,8 +121,8 @@ class FrameChecks {
       for (auto i = header_.offsets[s]; i + 1 < header_.offsets[s + 1]; ++i) {
         const double now = (point(frame.position, i + 1) - point(frame.position, i)).norm(),
                      rest = rest_edge(i);
-        // Edges of next to no length: their rounding alone is more.
-        if (rest > 1e-4) strain[s] = std::max(strain[s], std::abs(now / rest - 1));
+        const double rounding = kRounding * point(frame.position, i).norm();
+        if (rest > 0) strain[s] = std::max(strain[s], (std::abs(now - rest) - rounding) / rest);
       }
     });
     if (frame.number == header_.first_frame) return;  // not stepped yet: no figures

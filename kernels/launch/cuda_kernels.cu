@@ -88,7 +88,10 @@ class Strands final : public CudaStrands {
                                   p.rounds,
                                   p.length_iterations,
                                   p.length_tolerance,
-                                  contact_figures_.data()};
+                                  contact_figures_.data(),
+                                  p.strain_limit,
+                                  p.speed_limit,
+                                  p.skipped_substeps};
     stream_.parallel_for("contact step", threads(), ContactStepThread{step, scratch()});
   }
 

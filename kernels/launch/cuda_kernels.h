@@ -47,9 +47,11 @@ struct CudaLaunches {
 struct ContactParameters {
   float step;  // h [s]
   std::int32_t clamped;
-  std::int32_t rounds;             // cap on the alternation of length and contact projections
-  std::int32_t length_iterations;  // 0: lengths are not projected
-  float length_tolerance;          // largest edge strain left [-]
+  std::int32_t rounds;              // cap on the alternation of length and contact projections
+  std::int32_t length_iterations;   // 0: lengths are not projected
+  float length_tolerance;           // largest edge strain left [-]
+  float strain_limit, speed_limit;  // [-], [m/s]; see ContactStep
+  std::int32_t skipped_substeps;
 };
 
 // The strands of a run on the device. Arrays are laid out as on the host (StrandBatches, StrandState,

@@ -19,7 +19,7 @@ RINGLET_FUNCTION Vector3<T> closest_barycentrics(Vector3<T> p, Vector3<T> a, Vec
   if (d3 >= zero && d4 <= d3) return {zero, one, zero};
   const T vc = d1 * d4 - d3 * d2;
   if (vc <= zero && d1 >= zero && d3 <= zero) {
-    const T t = d1 / (d1 - d3);
+    const T t = d1 - d3 > zero ? d1 / (d1 - d3) : zero;
     return {one - t, t, zero};
   }
   const Vector3<T> cp = p - c;
@@ -27,12 +27,12 @@ RINGLET_FUNCTION Vector3<T> closest_barycentrics(Vector3<T> p, Vector3<T> a, Vec
   if (d6 >= zero && d5 <= d6) return {zero, zero, one};
   const T vb = d5 * d2 - d1 * d6;
   if (vb <= zero && d2 >= zero && d6 <= zero) {
-    const T t = d2 / (d2 - d6);
+    const T t = d2 - d6 > zero ? d2 / (d2 - d6) : zero;
     return {one - t, zero, t};
   }
   const T va = d3 * d6 - d5 * d4;
   if (va <= zero && d4 - d3 >= zero && d5 - d6 >= zero) {
-    const T t = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+    const T sum = (d4 - d3) + (d5 - d6), t = sum > zero ? (d4 - d3) / sum : zero;
     return {zero, one - t, t};
   }
   const T sum = va + vb + vc;

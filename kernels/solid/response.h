@@ -13,7 +13,16 @@
 namespace ringlet::kernels {
 
 // Written for each strand and substep, [batches][kContactFigures].
-enum ContactFigure { kTouched, kContactStrain, kPushed, kRounds, kSwept, kContactFigures };
+enum ContactFigure {
+  kTouched,
+  kContactStrain,
+  kPushed,
+  kRounds,
+  kSwept,
+  kContactSpeed,
+  kContactDiverged,
+  kContactFigures
+};
 
 template <class T>
 struct ContactStep {
@@ -28,8 +37,12 @@ struct ContactStep {
   std::int32_t rounds;             // cap on the alternation of length and contact projections
   std::int32_t length_iterations;  // 0: lengths are not projected
   T length_tolerance;
-  T* figures;  // [batches][kContactFigures]: 1 where a solid moved the strand, largest strain left [-],
-               // last push-out [m], rounds, particles swept
+  T* figures;      // [batches][kContactFigures]: 1 where a solid moved the strand, largest strain left [-],
+                   // last push-out [m], rounds, particles swept, largest speed [m/s], 1 where diverged or not
+                   // finite
+  T strain_limit;  // a strand that a solid moved beyond either limit counts as diverged
+  T speed_limit;   // [m/s]
+  std::int32_t skipped_substeps;  // since lengths were last projected: their displacement took all of these
 };
 
 inline namespace RINGLET_ISA {
@@ -286,7 +299,7 @@ RINGLET_FUNCTION void collide_strands(const ContactStep<Scalar<R>>& step, int ba
   const R count = load<R>(step.batches.count + batch * kLanes + lane);
   ProjectedStrand<R> lengths{pack.position,
                              pack.velocity,
-                             R(T(1) / step.step),
+                             R(T(1) / (step.step * T(1 + step.skipped_substeps))),
                              step.batches.rest_length + base,
                              kLanes,
                              pack.normal,
@@ -313,10 +326,20 @@ RINGLET_FUNCTION void collide_strands(const ContactStep<Scalar<R>>& step, int ba
       any_open = any_open || !settled;
     }
   }
-  for (int k = 0; k < 3 * n; ++k) {
-    store(x + k * kLanes, load<R>(pack.position + k * stride));
-    store(v + k * kLanes, load<R>(pack.velocity + k * stride));
+  if (step.length_iterations == 0) {  // lengths are not held, but limits and figures want to know them
+    store(left, eliminate_lengths(lengths));
+    for (int l = 0; l < kWidth; ++l) strains[l] = left[l];
   }
+  R speed2 = R(0), check = R(0);  // `check` turns NaN where anything is not finite
+  for (int i = 0; i < n; ++i) {
+    const Vector3<R> position = load3<R>(pack.position + 3 * i * stride, stride);
+    const Vector3<R> velocity = load3<R>(pack.velocity + 3 * i * stride, stride);
+    store3<R>(x + 3 * i * kLanes, kLanes, position);
+    store3<R>(v + 3 * i * kLanes, kLanes, velocity);
+    speed2 = max(speed2, dot(velocity, velocity));
+    check = fma(R(0), dot(velocity, velocity) + dot(position, position), check);
+  }
+  store(left, speed2 + check);
   T* out = step.figures + static_cast<std::int64_t>(batch) * kContactFigures * kLanes + lane;
   for (int l = 0; l < kWidth; ++l) {
     out[kTouched * kLanes + l] = figures[l].touched ? T(1) : T(0);
@@ -324,6 +347,9 @@ RINGLET_FUNCTION void collide_strands(const ContactStep<Scalar<R>>& step, int ba
     out[kPushed * kLanes + l] = figures[l].pushed;
     out[kRounds * kLanes + l] = rounds[l];
     out[kSwept * kLanes + l] = static_cast<T>(figures[l].swept);
+    out[kContactSpeed * kLanes + l] = sqrt(left[l]);
+    const bool healthy = strains[l] <= step.strain_limit && left[l] <= step.speed_limit * step.speed_limit;
+    out[kContactDiverged * kLanes + l] = figures[l].touched && !healthy ? T(1) : T(0);
   }
 }
 

@@ -243,8 +243,11 @@ RINGLET_KERNEL SubstepResult<R> advance_strand(const StrandPack<R>& s, const Str
     store3<R>(to.position + 3 * i * stride, stride, select(lives, x, zero3<R>()));
     later[2] = later[1], later[1] = later[0], later[0] = v;
   }
-  const ProjectedStrand<R> lengths{to.position, to.velocity, R(1) / h,    s.rest_length, kLanes,   nullptr,
-                                   factor,      stride,      s.particles, s.count,       p.clamped};
+  const ProjectedStrand<R> lengths{
+      to.position,   to.velocity, R(1) / (h * R(Scalar<R>(1 + p.skipped_substeps))),
+      s.rest_length, kLanes,      nullptr,
+      factor,        stride,      s.particles,
+      s.count,       p.clamped};
   const ProjectionResult<R> result =
       project_lengths(lengths, R(p.length_tolerance), p.length_iterations, active);
   return {result.strain, result.iterations};

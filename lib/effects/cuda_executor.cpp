@@ -62,8 +62,9 @@ class CudaExecutor : public Executor<float> {
       if (!collides_known_) strands_->upload_collides({step.collides, lanes_});
       collides_known_ = true;
       strands_->upload_solids({step.solids, static_cast<std::size_t>(step.solid_count)}, frame);
-      strands_->contact_step(
-          {step.step, step.clamped, step.rounds, step.length_iterations, step.length_tolerance});
+      strands_->contact_step({step.step, step.clamped, step.rounds, step.length_iterations,
+                              step.length_tolerance, step.strain_limit, step.speed_limit,
+                              step.skipped_substeps});
       strands_->download_figures({}, {step.figures, lanes_ * kernels::kContactFigures});
     });
   }

@@ -24,7 +24,7 @@ def readme_scene():
 def test_the_scene_follows_the_schema(program, tmp_path):
     scene = readme_scene()
     scene["head"] = {"mesh": "head.obj"}
-    scene["groom"] = {"grow": {}}
+    scene["groom"] = {"grow": {"strands": 5}}
     (tmp_path / "head.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 0 -1\nf 1 2 3\n")
     (tmp_path / "shake.json").write_text(json.dumps(scene))
     result = run(program, "validate", tmp_path / "shake.json")

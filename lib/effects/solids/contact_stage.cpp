@@ -33,6 +33,7 @@ class ContactStage : public Stage<T> {
     return total;
   }
   int launches() const override { return 1; }
+  std::int64_t diverged_strand() const override { return diverged_; }
 
   void run(Executor<T>& executor, const Substep& substep, FrameReport& report) override {
     for (std::size_t k = 0; k < solids_.size(); ++k)
@@ -51,6 +52,10 @@ class ContactStage : public Stage<T> {
     const bool project = lengths && (lengths->cadence == scene::Cadence::kSubstep || substep.last_of_frame);
     step.length_iterations = project ? lengths->max_iterations : 0;
     step.length_tolerance = project ? static_cast<T>(lengths->tolerance) : T(0);
+    step.skipped_substeps =
+        lengths && lengths->cadence == scene::Cadence::kFrame ? scene_.model.substeps - 1 : 0;
+    step.strain_limit = static_cast<T>(scene_.limits.edge_strain);
+    step.speed_limit = static_cast<T>(scene_.limits.speed);
     step.figures = figures_.data();
     executor.contact_step(step, substep.frame);
     gather(substep, report);
@@ -62,10 +67,14 @@ class ContactStage : public Stage<T> {
   }
 
   void gather(const Substep& substep, FrameReport& report) {
+    diverged_ = -1;
     for (std::size_t strand = 0; strand < model_.layout.strands(); ++strand) {
       report.swept += figure(strand, kernels::kSwept);
       if (!(figure(strand, kernels::kTouched) > T(0))) continue;
       report.moved[strand] = 1;
+      report.speed = std::max(report.speed, static_cast<double>(figure(strand, kernels::kContactSpeed)));
+      if (diverged_ < 0 && figure(strand, kernels::kContactDiverged) > T(0))
+        diverged_ = static_cast<std::int64_t>(strand);
       report.strain[strand] = static_cast<float>(figure(strand, kernels::kContactStrain));
       report.contact_rounds =
           std::max(report.contact_rounds, static_cast<double>(figure(strand, kernels::kRounds)));
@@ -80,6 +89,7 @@ class ContactStage : public Stage<T> {
   state::StrandState<T>& state_;
   std::vector<kernels::SolidView> views_;
   state::AlignedVector<T> collides_, figures_;
+  std::int64_t diverged_ = -1;
 };
 
 }  // namespace

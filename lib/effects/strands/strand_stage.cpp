@@ -43,6 +43,7 @@ class StrandStage : public Stage<T> {
         parameters_(strand_parameters<T>(scene)),
         lengths_at_frame_end_(scene.effects.inextensible &&
                               scene.effects.inextensible->cadence == scene::Cadence::kFrame),
+        substeps_(scene.model.substeps),
         figures_(static_cast<std::size_t>(model.layout.batches()) * kernels::kFigures * kLanes) {}
 
   std::string name() const override { return "strands"; }
@@ -55,6 +56,7 @@ class StrandStage : public Stage<T> {
                                 figures_.data()};
     step.parameters.step = static_cast<T>(substep.step);
     if (lengths_at_frame_end_ && !substep.last_of_frame) step.parameters.length_iterations = 0;
+    if (lengths_at_frame_end_) step.parameters.skipped_substeps = substeps_ - 1;
     executor.strand_step(step);
     gather(report);
   }
@@ -82,6 +84,7 @@ class StrandStage : public Stage<T> {
   state::StrandState<T>& state_;
   kernels::StrandParameters<T> parameters_;
   bool lengths_at_frame_end_;
+  int substeps_;  // a frame
   state::AlignedVector<T> figures_;
   std::int64_t diverged_ = -1;
 };

@@ -150,12 +150,13 @@ class FrameChecks {
     find_buried(frame, head);
     std::atomic<int> deep = 0, in_openings = 0;
     std::mutex mutex;
+    const double asked = std::min(deepest_, kDepth);  // what is no deeper needs no winding number
     for_each_strand([&](std::size_t s) {
       if (buried_[s]) return;
       for (auto i = header_.offsets[s] + 2; i < header_.offsets[s + 1]; ++i) {
         const MeshDistance::Vec3 x = point(frame.position, i);
         const double distance = head.closest(x).distance;
-        if (distance <= std::min(deepest_, kDepth)) continue;
+        if (distance <= asked) continue;
         const double winding = std::abs(head.winding_number(x));
         if (winding < kInside) {
           in_openings += winding > 0.5 && distance > kDepth;

@@ -4,7 +4,8 @@
 // Coulomb friction:    v' = v_solid + max(0, 1 - mu |u_n| / |u_t|) u_t,   u = v - v_solid and moves to x + h
 // v'; if that is still inside it is pushed out along the normal (the paper's sign pushes deeper). Lengths and
 // contacts are then projected in turn, the contact last, until both hold or the cap is met. A particle that
-// travels farther than the narrow band in one substep is looked for along its way, so that nothing tunnels.
+// travels farther than the narrow band in one substep is looked for along its way, though a solid thinner
+// than the travel but within the band can still be passed.
 #pragma once
 #include "kernels/solid/surface.h"
 #include "kernels/strand/length_projection.h"

@@ -150,12 +150,12 @@ class StrandRun {
   // The contact stage after a step; lengths as `parameters` says.
   void collide(const std::vector<kernels::SolidView>& solids, int at_a_time = 0) {
     const int batches = model.layout.batches(), piece = at_a_time > 0 ? at_a_time : batches;
-    const state::AlignedVector<T> collides(batches * kernels::kLanes, T(1));
+    const state::AlignedVector<std::int32_t> none(batches * kernels::kLanes, kernels::kNoSkin);
     contact_figures.assign(static_cast<std::size_t>(batches) * kernels::kContactFigures * kernels::kLanes,
                            T(0));
     kernels::ContactStep<T> step{};
     step.batches = model.view(), step.state = state.view(), step.root_points = state.root_points.data();
-    step.collides = collides.data(), step.solids = solids.data();
+    step.skin = none.data(), step.home = -1, step.solids = solids.data();
     step.solid_count = static_cast<std::int32_t>(solids.size());
     step.step = parameters.step, step.clamped = parameters.clamped, step.rounds = 8;
     step.length_iterations = parameters.length_iterations,

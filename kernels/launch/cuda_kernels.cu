@@ -48,7 +48,7 @@ class Strands final : public CudaStrands {
     const std::vector<std::int32_t> begin = scratch_particles(model.row, batches_);
     scratch_begin_.upload(begin, stream_.get());
     scratch_.resize(std::size_t(begin.back()) * kScratchReals * kWarp);
-    collides_.upload(std::vector<float>(lanes, 1.0f), stream_.get());
+    skin_.upload(std::vector<std::int32_t>(lanes, kNoSkin), stream_.get());
     position_.resize(rows * 3 * kLanes), velocity_.resize(rows * 3 * kLanes);
     root_motion_.resize(lanes * kRootValues), root_points_.resize(lanes * 3);
     strand_figures_.resize(lanes * kFigures), contact_figures_.resize(lanes * kContactFigures);
@@ -67,7 +67,7 @@ class Strands final : public CudaStrands {
   void upload_roots(std::span<const float> motion, std::span<const double> points) override {
     send("root motion", motion, root_motion_), send("root points", points, root_points_);
   }
-  void upload_collides(std::span<const float> collides) override { send("collides", collides, collides_); }
+  void upload_skin(std::span<const std::int32_t> skin) override { send("skin", skin, skin_); }
   void upload_solids(std::span<const SolidView> solids, std::int64_t interval) override {
     solids_.upload(solids, interval, stream_.get());
   }
@@ -80,9 +80,10 @@ class Strands final : public CudaStrands {
     const ContactStep<float> step{batches(),
                                   state(),
                                   root_points_.data(),
-                                  collides_.data(),
+                                  skin_.data(),
                                   solids_.views(),
                                   solids_.count(),
+                                  p.home,
                                   p.step,
                                   p.clamped,
                                   p.rounds,
@@ -105,7 +106,7 @@ class Strands final : public CudaStrands {
   std::size_t bytes() const override {
     return row_.bytes() + count_.bytes() + rest_.bytes() + rest_length_.bytes() + stiffness_.bytes() +
            preload_.bytes() + position_.bytes() + velocity_.bytes() + root_motion_.bytes() +
-           root_points_.bytes() + collides_.bytes() + strand_figures_.bytes() + contact_figures_.bytes() +
+           root_points_.bytes() + skin_.bytes() + strand_figures_.bytes() + contact_figures_.bytes() +
            scratch_begin_.bytes() + scratch_.bytes() + solids_.bytes();
   }
 
@@ -142,7 +143,8 @@ class Strands final : public CudaStrands {
   std::int32_t batches_;
   DeviceBuffer<std::int32_t> row_;
   DeviceBuffer<float> count_, rest_, rest_length_, stiffness_, preload_;
-  DeviceBuffer<float> position_, velocity_, root_motion_, collides_;
+  DeviceBuffer<float> position_, velocity_, root_motion_;
+  DeviceBuffer<std::int32_t> skin_;
   DeviceBuffer<double> root_points_;
   DeviceBuffer<float> strand_figures_, contact_figures_;
   DeviceBuffer<std::int32_t> scratch_begin_;

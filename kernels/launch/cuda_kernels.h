@@ -52,6 +52,7 @@ struct ContactParameters {
   float length_tolerance;           // largest edge strain left [-]
   float strain_limit, speed_limit;  // [-], [m/s]; see ContactStep
   std::int32_t skipped_substeps;
+  std::int32_t home;  // see ContactStep
 };
 
 // The strands of a run on the device. Arrays are laid out as on the host (StrandBatches, StrandState,
@@ -70,8 +71,8 @@ class CudaStrands {
   virtual void upload_roots(std::span<const float> motion, std::span<const double> points) = 0;
   virtual void strand_step(const StrandParameters<float>& parameters) = 0;
 
-  // [batches] 1 where a strand collides, 0 where it is left alone. Until called, all collide.
-  virtual void upload_collides(std::span<const float> collides) = 0;
+  // [batches] what each strand grows on, as ContactStep::skin. Until called, none grows on anything.
+  virtual void upload_skin(std::span<const std::int32_t> skin) = 0;
   // The solids over the next substep; pointers are the host's. Level sets and surfaces stay on the device:
   // those of a deforming solid are copied again when `interval`, the number of the frame interval that the
   // substep lies in, is another than last time, its vertices every time; those of a rigid one only when its

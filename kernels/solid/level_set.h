@@ -30,6 +30,7 @@ template <class T>
 struct LevelSetSample {
   T distance;             // [m], plus or minus the background beyond the band
   std::int32_t triangle;  // closest to the voxel nearest to the point; -1 where unknown
+  bool enclosed;          // no voxel about the point is outside
 };
 
 // A value beyond this many voxels needs no interpolation: the surface is not in the cell.
@@ -44,22 +45,38 @@ RINGLET_FUNCTION LevelSetSample<T> sample_level_set(const LevelSetView& set, Vec
   const Vector3<T> q = {index(p.x), index(p.y), index(p.z)};
   const auto nearest = [](T a) { return floor_to_int(a + T(0.5)); };
   const std::int64_t centre = voxel_at(set, nearest(q.x), nearest(q.y), nearest(q.z));
-  if (centre < 0) return {centre == kTileInside ? T(0) - background : background, -1};
+  if (centre < 0) return {centre == kTileInside ? T(0) - background : background, -1, centre == kTileInside};
   const T value = static_cast<T>(set.distance[centre]);
   const std::int32_t triangle = set.triangle[centre];
-  if (abs(value) > static_cast<T>(kFarVoxels * set.voxel_size)) return {value, triangle};
+  if (abs(value) > static_cast<T>(kFarVoxels * set.voxel_size)) return {value, triangle, value < T(0)};
 
   const int x = floor_to_int(q.x), y = floor_to_int(q.y), z = floor_to_int(q.z);
   const T f[3] = {q.x - static_cast<T>(x), q.y - static_cast<T>(y), q.z - static_cast<T>(z)};
+  bool enclosed = true;
   const auto at = [&](int corner) {
     const std::int64_t voxel = voxel_at(set, x + (corner >> 2), y + (corner >> 1 & 1), z + (corner & 1));
-    if (voxel < 0) return voxel == kTileInside ? T(0) - background : background;
-    return static_cast<T>(set.distance[voxel]);
+    const T found = voxel >= 0             ? static_cast<T>(set.distance[voxel])
+                    : voxel == kTileInside ? T(0) - background
+                                           : background;
+    enclosed = enclosed && found < T(0);
+    return found;
   };
   const auto mix = [](T t, T a, T b) { return fma(t, b - a, a); };
   const T low = mix(f[1], mix(f[2], at(0), at(1)), mix(f[2], at(2), at(3)));
   const T high = mix(f[1], mix(f[2], at(4), at(5)), mix(f[2], at(6), at(7)));
-  return {mix(f[0], low, high), triangle};
+  return {mix(f[0], low, high), triangle, enclosed};
+}
+
+// To the box of all tiles [m]; 0 within. Nothing outside it is near the surface.
+template <class T>
+RINGLET_FUNCTION T distance_to_bounds(const LevelSetView& set, Vector3<T> p) {
+  const T edge = static_cast<T>(8 * set.voxel_size);
+  const auto beyond = [&](T a, int axis) {
+    const T low = edge * static_cast<T>(set.tile_min[axis]),
+            high = low + edge * static_cast<T>(set.tile_count[axis]);
+    return max(T(0), max(low - a, a - high));
+  };
+  return length(Vector3<T>{beyond(p.x, 0), beyond(p.y, 1), beyond(p.z, 2)});
 }
 
 // The triangles closest to the corners of the cell that holds p; -1 where unknown.

@@ -112,17 +112,52 @@ inline constexpr float kNearVoxels = 0.5f;
 // By how much the exact distance may differ from the level set's before it is doubted, in voxels.
 inline constexpr float kDoubtVoxels = 0.1f;
 
-// `p` in level-set coordinates at the substep's end [m]. Where the level set puts the surface farther than
-// `near` [m] only the distance is given.
+// What the level sets say, blended in time.
 template <class T>
-RINGLET_OUTLINED SurfaceSample<T> sample_surface(const SolidView& solid, Vector3<T> p, T near) {
-  const LevelSetSample<T> first = sample_level_set(solid.level_set[0], p);
-  LevelSetSample<T> second = first;
-  T distance = first.distance;
-  if (solid.blend > 0.0f) {
+struct BlendedSample {
+  LevelSetSample<T> first, second;
+  T distance;     // [m]
+  bool enclosed;  // no voxel about the point is outside
+
+  RINGLET_FUNCTION BlendedSample(const SolidView& solid, Vector3<T> p)
+      : first(sample_level_set(solid.level_set[0], p)),
+        second(first),
+        distance(first.distance),
+        enclosed(first.enclosed) {
+    if (!(solid.blend > 0.0f)) return;
     second = sample_level_set(solid.level_set[1], p);
     distance = fma(static_cast<T>(solid.blend), second.distance - first.distance, first.distance);
+    enclosed = enclosed && second.enclosed;
   }
+};
+
+// By how much another part of the solid must overlap a triangle for it to count as covered, in voxels.
+inline constexpr float kCoveredVoxels = 0.1f;
+
+// Where a strand grows on the solid: the level set's time-blended guess can miss that place, and does not know
+// it where another part of the solid covers it, in a fold of skin or behind a limb.
+struct Patch {
+  std::int32_t triangle = -1;
+  bool covered = false;
+};
+
+// Whether the triangle lies inside the solid where it is closest to p.
+template <class T>
+RINGLET_FUNCTION bool is_covered(const SolidView& solid, std::int32_t triangle, Vector3<T> p) {
+  const Vector3<T> on_triangle = p - closest_on_triangle(solid, triangle, p).to_point;
+  const T limit = static_cast<T>(kCoveredVoxels * solid.level_set[0].voxel_size);
+  return BlendedSample<T>(solid, on_triangle).distance < T(0) - limit;
+}
+
+// `p` in level-set coordinates at the substep's end [m]. Where the level set puts the surface farther than
+// `near` [m] only the distance is given. The level set knows the surface that can be reached from without; a
+// covered patch is surface too, and both of its sides are inside.
+template <class T>
+RINGLET_OUTLINED SurfaceSample<T> sample_surface(const SolidView& solid, Vector3<T> p, const Patch& skin,
+                                                 T near) {
+  const BlendedSample<T> level(solid, p);
+  const LevelSetSample<T>&first = level.first, &second = level.second;
+  const T distance = level.distance;
   SurfaceSample<T> sample{distance - static_cast<T>(solid.offset), false, zero3<T>(), -1, zero3<T>()};
   const T voxel = static_cast<T>(solid.level_set[0].voxel_size);
   if (sample.distance > near) return sample;
@@ -130,6 +165,7 @@ RINGLET_OUTLINED SurfaceSample<T> sample_surface(const SolidView& solid, Vector3
   ClosestPoint<T> best{T(1e30), zero3<T>(), zero3<T>(), -1};
   consider(solid, first.triangle, p, best);
   consider(solid, second.triangle, p, best);
+  consider(solid, skin.triangle, p, best);
   if (best.triangle < 0) {  // past the band, deep inside: ask every triangle
     for (std::int32_t triangle = 0; triangle < solid.triangle_count; ++triangle)
       consider(solid, triangle, p, best);
@@ -146,15 +182,23 @@ RINGLET_OUTLINED SurfaceSample<T> sample_surface(const SolidView& solid, Vector3
     walk(solid, p, best);
   }
 
+  bool on_skin = false;
+  if (skin.covered && distance < T(0)) {
+    ClosestPoint<T> own = closest_on_triangle(solid, skin.triangle, p);
+    walk(solid, p, own);
+    on_skin = own.distance2 <= best.distance2;
+    if (on_skin) best = own;
+  }
   const Vector3<T> out = outward(solid, best);
   const T away = sqrt(best.distance2);
   const bool far_from_zero = abs(distance) > T(0.75) * voxel;  // there the level set knows the side
-  const bool inside = far_from_zero ? distance < T(0) : dot(best.to_point, out) < T(0);
+  const bool inside =
+      on_skin || level.enclosed || (far_from_zero ? distance < T(0) : dot(best.to_point, out) < T(0));
   const bool touching = away < T(1e-7);  // [m] no direction of its own
   const T side = inside ? T(-1) : T(1);
   const Vector3<T> towards = touching ? out : side * best.to_point;
   sample.exact = true;
-  sample.distance = side * away - static_cast<T>(solid.offset);
+  sample.distance = side * away - (on_skin ? T(0) : static_cast<T>(solid.offset));
   sample.normal = inverse_or_zero(length(towards), shortest_direction<T>()) * towards;
   sample.triangle = best.triangle;
   sample.barycentric = best.barycentric;
@@ -162,8 +206,21 @@ RINGLET_OUTLINED SurfaceSample<T> sample_surface(const SolidView& solid, Vector3
 }
 
 template <class T>
-RINGLET_FUNCTION SurfaceSample<T> sample_surface(const SolidView& solid, Vector3<T> p) {
-  return sample_surface(solid, p, static_cast<T>(kNearVoxels * solid.level_set[0].voxel_size));
+RINGLET_FUNCTION SurfaceSample<T> sample_surface(const SolidView& solid, Vector3<T> p,
+                                                 const Patch& skin = {}) {
+  return sample_surface(solid, p, skin, static_cast<T>(kNearVoxels * solid.level_set[0].voxel_size));
+}
+
+// The sheet of the surface that a walk from `triangle` leads to, for a point behind it or behind another sheet:
+// it lies inside, whichever side of this sheet it is on.
+template <class T>
+RINGLET_FUNCTION SurfaceSample<T> sample_sheet(const SolidView& solid, Vector3<T> p, std::int32_t triangle) {
+  ClosestPoint<T> own = closest_on_triangle(solid, triangle, p);
+  walk(solid, p, own);
+  const T away = sqrt(own.distance2);
+  const Vector3<T> towards = away < T(1e-7) ? outward(solid, own) : T(-1) * own.to_point;
+  return {T(0) - away, true,
+          inverse_or_zero(length(towards), shortest_direction<T>()) * towards, own.triangle, own.barycentric};
 }
 
 // World from level-set axes and back.
@@ -180,15 +237,27 @@ RINGLET_FUNCTION Vector3<T> rotate_back(const double* rotation, Vector3<T> a) {
           fma(m(8), a.z, fma(m(5), a.y, m(2) * a.x))};
 }
 
+template <class T>
+RINGLET_FUNCTION Vector3<T> surface_point(const SolidView& solid, const float* vertices, std::int32_t triangle,
+                                          Vector3<T> barycentric) {
+  const std::int32_t* v = solid.triangles + 3 * static_cast<std::int64_t>(triangle);
+  return barycentric.x * corner<T>(vertices, v[0]) + barycentric.y * corner<T>(vertices, v[1]) +
+         barycentric.z * corner<T>(vertices, v[2]);
+}
+
+// How far a surface point moves over the substep by deformation alone, level-set axes [m].
+template <class T>
+RINGLET_FUNCTION Vector3<T> local_displacement(const SolidView& solid, std::int32_t triangle,
+                                               Vector3<T> barycentric) {
+  return surface_point(solid, solid.vertices, triangle, barycentric) -
+         surface_point(solid, solid.vertices_before, triangle, barycentric);
+}
+
 // How far the sampled surface point moves over the substep, in the world [m].
 template <class T>
 RINGLET_FUNCTION Vector3<T> surface_displacement(const SolidView& solid, const SurfaceSample<T>& at) {
-  const std::int32_t* v = solid.triangles + 3 * static_cast<std::int64_t>(at.triangle);
-  const auto point = [&](const float* vertices) {
-    return at.barycentric.x * corner<T>(vertices, v[0]) + at.barycentric.y * corner<T>(vertices, v[1]) +
-           at.barycentric.z * corner<T>(vertices, v[2]);
-  };
-  const Vector3<T> before = point(solid.vertices_before), now = point(solid.vertices);
+  const Vector3<T> before = surface_point(solid, solid.vertices_before, at.triangle, at.barycentric),
+                   now = surface_point(solid, solid.vertices, at.triangle, at.barycentric);
   // R1 p1 - R0 p0 + (t1 - t0), with differences taken first: exactly zero for a still solid.
   double turn[9];
   for (int k = 0; k < 9; ++k) turn[k] = solid.rotation[k] - solid.rotation_before[k];

@@ -46,8 +46,15 @@ RINGLET_KERNEL Vector3<R> mobility(const ProjectedStrand<R>& s, int particle, Ve
   return fma((contact_slip<R>() - R(1)) * dot(n, a), n, a);
 }
 
+// Segments shorter than this [m], a fiftieth of a hair's width, are left to the springs: they have no direction
+// to speak of.
+template <class R>
+RINGLET_KERNEL R shortest_held() {
+  return R(Scalar<R>(1e-6));
+}
+
 // Eliminates the tridiagonal system from the root on, into the scratch, and returns the largest edge strain
-// |C_k| / l_k found. Segments of no rest length are left to the springs.
+// |C_k| / l_k found.
 template <class R>
 RINGLET_FUNCTION R eliminate_lengths(const ProjectedStrand<R>& s) {
   const R nothing = shortest_direction<R>();
@@ -57,7 +64,7 @@ RINGLET_FUNCTION R eliminate_lengths(const ProjectedStrand<R>& s) {
     Scalar<R>* row = s.scratch + kProjectionReals * k * s.stride;
     const Vector3<R> next = load3<R>(s.position + 3 * (k + 1) * s.stride, s.stride);
     const R rest = load<R>(s.rest_length + 3 * k * s.rest_stride), now = length(next - here);
-    const Mask<R> held = (R(Scalar<R>(k + 1)) < s.count) & (rest > nothing);
+    const Mask<R> held = (R(Scalar<R>(k + 1)) < s.count) & (rest > shortest_held<R>());
     strain = max(strain, select(held, abs(fma(now, inverse_or_zero(rest, nothing), R(-1))), R(0)));
 
     Vector3<R> direction = inverse_or_zero(now, nothing) * (next - here);

@@ -59,12 +59,12 @@ class CudaExecutor : public Executor<float> {
 
   void contact_step(const kernels::ContactStep<float>& step, int frame) override {
     on_device([&] {
-      if (!collides_known_) strands_->upload_collides({step.collides, lanes_});
-      collides_known_ = true;
+      if (!skin_known_) strands_->upload_skin({step.skin, lanes_});
+      skin_known_ = true;
       strands_->upload_solids({step.solids, static_cast<std::size_t>(step.solid_count)}, frame);
       strands_->contact_step({step.step, step.clamped, step.rounds, step.length_iterations,
                               step.length_tolerance, step.strain_limit, step.speed_limit,
-                              step.skipped_substeps});
+                              step.skipped_substeps, step.home});
       strands_->download_figures({}, {step.figures, lanes_ * kernels::kContactFigures});
     });
   }
@@ -73,7 +73,7 @@ class CudaExecutor : public Executor<float> {
   kernels::CudaDevice device_;
   std::size_t lanes_;
   std::unique_ptr<kernels::CudaStrands> strands_;
-  bool collides_known_ = false;  // which strands collide is the same in every step of a run
+  bool skin_known_ = false;  // what strands grow on is the same in every step of a run
 };
 
 }  // namespace

@@ -38,7 +38,8 @@ class Attachment {
   // Stored coordinates that do not lie at the root give way to the stored triangle's nearest point. Throws
   // Error{kInput} naming strand and distance where a root is farther than `desc.attach_distance` from the
   // head, or a stored triangle does not exist.
-  static Attachment to_head(const Strands& strands, const Scalp& rest, const scene::Groom& desc);
+  // `desc.root_offset` snap moves the strands so that their roots lie on the head.
+  static Attachment to_head(Strands& strands, const Scalp& rest, const scene::Groom& desc);
 
   const std::vector<RootSite>& sites() const { return sites_; }
 

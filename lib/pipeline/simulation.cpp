@@ -103,7 +103,7 @@ class TypedSimulation : public Simulation {
     stages_.push_back(effects::make_strand_stage<T>(scene_, model_, state_));
     if (!world_.solids.empty())
       stages_.push_back(
-          effects::make_contact_stage<T>(scene_, world_.solids, world_.collides, model_, state_));
+          effects::make_contact_stage<T>(scene_, world_.solids, world_.skin, model_, state_));
     make_plan();
   }
 

@@ -7,6 +7,8 @@
 #include "core/error.h"
 #include "core/log.h"
 #include "effects/solids/penetration.h"
+#include "groom/closest_triangle.h"
+#include "kernels/solid/response.h"
 #include "kernels/strand/strand_batch.h"
 
 namespace ringlet::pipeline {
@@ -14,8 +16,6 @@ namespace ringlet::pipeline {
 double first_time(const scene::Frames& frames) { return -frames.preroll / frames.fps; }
 
 namespace {
-
-constexpr std::size_t kNone = static_cast<std::size_t>(-1);
 
 groom::Scalp scalp_of(const solids::AnimatedMesh& head) {
   return {head.rest_vertices(), head.triangles(), head.mesh_of_triangle(), head.mesh_names()};
@@ -29,7 +29,9 @@ void build_solids(const scene::Scene& scene, World& world) {
       mesh = &world.solid_meshes.emplace_back(*desc.mesh, scene.units, scene.frames);
       world.shown.push_back(mesh), world.shown_names.push_back(desc.name);
     }
-    if (desc.proxy) mesh = &world.solid_meshes.emplace_back(*desc.proxy, scene.units, scene.frames);
+    if (desc.proxy)
+      mesh = &world.solid_meshes.emplace_back(*desc.proxy, scene.units, scene.frames);
+    if (desc.is_head) world.skin.home = static_cast<std::int32_t>(world.solids.size()), world.home_mesh = mesh;
     world.solids.emplace_back(desc, *mesh, scene.frames, first_time(scene.frames),
                               desc.level_set_cache.value_or(std::filesystem::path{}));
   }
@@ -72,19 +74,16 @@ groom::Strands without(const groom::Strands& strands, const std::vector<unsigned
 }
 
 std::optional<groom::Attachment> attach(const World& world, const scene::Groom& desc,
-                                        const groom::Strands& strands) {
+                                        groom::Strands& strands) {
   if (desc.attach == scene::Attach::kFixed) return std::nullopt;
   return groom::Attachment::to_head(strands, scalp_of(*world.head), desc);
 }
 
 // Moves what starts inside the head out of it, in the rest shape; says how much that was.
 void clear_head(const scene::Scene& scene, const scene::Groom& desc, World& world, groom::Strands& strands,
-                std::optional<groom::Attachment>& attachment, std::vector<unsigned char>& collides) {
-  collides.assign(strands.size(), 1);
-  std::size_t head_solid = kNone;
-  for (std::size_t k = 0; k < scene.effects.solids.size(); ++k)
-    if (scene.effects.solids[k].is_head) head_solid = k;
-  if (head_solid == kNone) return;
+                std::optional<groom::Attachment>& attachment, std::vector<unsigned char>& ignores) {
+  ignores.assign(strands.size(), 0);
+  if (world.skin.home < 0) return;
 
   const std::vector<Vec3> rest = root_points(strands);
   const std::vector<Pose> poses = first_poses(world, scene, desc, attachment, rest);
@@ -96,7 +95,8 @@ void clear_head(const scene::Scene& scene, const scene::Groom& desc, World& worl
   std::vector<unsigned char> prune(strands.size(), 0);
   const double time = first_time(scene.frames);
   const effects::PenetrationReport report = effects::resolve_penetration(
-      desc.penetration, world.solids[head_solid].at(time, time), strands.offsets, points, collides, prune);
+      desc.penetration, world.solids[static_cast<std::size_t>(world.skin.home)].at(time, time),
+      strands.offsets, points, ignores, prune);
   for (std::size_t s = 0; s < strands.size(); ++s)
     for (auto i = strands.offsets[s]; i < strands.offsets[s + 1]; ++i)
       if (points[i] != posed[i])
@@ -112,18 +112,41 @@ void clear_head(const scene::Scene& scene, const scene::Groom& desc, World& worl
   if (report.buried > 0)
     log_warning(
         fmt::format("groom `{}`: {} strands have roots deeper in the head than they are long; they do not "
-                    "collide",
+                    "collide with it",
                     desc.name, report.buried));
   if (std::find(prune.begin(), prune.end(), 1) == prune.end()) return;
   strands = without(strands, prune);
   std::vector<unsigned char> kept;
   for (std::size_t s = 0; s < prune.size(); ++s)
-    if (!prune[s]) kept.push_back(collides[s]);
-  collides = std::move(kept);
+    if (!prune[s]) kept.push_back(ignores[s]);
+  ignores = std::move(kept);
   if (strands.size() == 0)
     throw Error(ErrorKind::kInput, desc.pointer, "every strand starts inside the head and was pruned",
                 "use \"penetration\": \"push_out\", or check units and up axis");
   attachment = attach(world, desc, strands);
+}
+
+// Roots on the head grow on its collision surface, whose first triangles are the head's; on a proxy, on the
+// triangle nearest in the rest pose.
+void append_skin(const scene::Scene& scene, const groom::Attachment* attachment,
+                 const groom::Strands& strands, const std::vector<unsigned char>& ignores, World& world) {
+  std::vector<std::int32_t>& skin = world.skin.triangles;
+  if (world.skin.home < 0) return;
+  const scene::Solid& home = scene.effects.solids[static_cast<std::size_t>(world.skin.home)];
+  std::optional<groom::ClosestTriangle> proxy;
+  if (home.proxy) {
+    const solids::AnimatedMesh& mesh = *world.home_mesh;
+    proxy.emplace(mesh.rest_vertices(), mesh.triangles());
+  }
+  for (std::size_t s = 0; s < strands.size(); ++s) {
+    if (ignores[s])
+      skin.push_back(kernels::kIgnoresHome);
+    else if (!attachment)
+      skin.push_back(kernels::kNoSkin);
+    else
+      skin.push_back(proxy ? proxy->find(strands.points[strands.offsets[s]]).triangle
+                           : attachment->sites()[s].triangle);
+  }
 }
 
 double sample_curve(const scene::Curve& curve, double x) {
@@ -178,9 +201,9 @@ void build_groom(const scene::Scene& scene, std::size_t index, bool scales_stiff
   groom::Strands strands = groom::build(desc, scene.units, scalp ? &*scalp : nullptr);
   if (strands.widths.empty()) strands.widths.assign(strands.points.size(), static_cast<float>(desc.width));
   std::optional<groom::Attachment> attachment = attach(world, desc, strands);
-  std::vector<unsigned char> collides;
-  clear_head(scene, desc, world, strands, attachment, collides);
-  world.collides.insert(world.collides.end(), collides.begin(), collides.end());
+  std::vector<unsigned char> ignores;
+  clear_head(scene, desc, world, strands, attachment, ignores);
+  append_skin(scene, attachment ? &*attachment : nullptr, strands, ignores, world);
   if (scales_stiffness) append_stiffness(scene, desc, strands, world.stiffness);
   append(strands, static_cast<std::int32_t>(index), world);
   if (attachment) {

@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "effects/solids/contact_stage.h"
 #include "groom/groom.h"
 #include "pipeline/roots.h"
 #include "scene/scene_desc.h"
@@ -24,7 +25,8 @@ struct World {
   std::vector<std::int32_t> groom_of_strand;
   std::vector<float> stiffness;  // [particles * kCouplings] where a groom scales it, else empty
   std::unique_ptr<Roots> roots;
-  std::vector<unsigned char> collides;  // [strands]
+  const solids::AnimatedMesh* home_mesh = nullptr;  // what collides as the head
+  effects::Skin skin;  // what they grow on among the solids
 };
 
 // Reads and builds all assets. Throws Error{kInput}.

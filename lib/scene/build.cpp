@@ -113,6 +113,8 @@ class Builder {
         word<Attach>(block["attach"],
                      {{"nearest", Attach::kNearest}, {"stored", Attach::kStored}, {"fixed", Attach::kFixed}});
     groom.attach_distance = block["attach_distance"];
+    groom.root_offset =
+        word<RootOffset>(block["root_offset"], {{"keep", RootOffset::kKeep}, {"snap", RootOffset::kSnap}});
     groom.penetration = word<Penetration>(
         block["penetration"],
         {{"push_out", Penetration::kPushOut}, {"keep", Penetration::kKeep}, {"prune", Penetration::kPrune}});

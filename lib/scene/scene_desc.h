@@ -70,6 +70,7 @@ struct MeshDesc {
 using Curve = std::vector<std::array<double, 2>>;
 
 enum class Attach { kNearest, kStored, kFixed };
+enum class RootOffset { kKeep, kSnap };
 enum class Penetration { kPushOut, kKeep, kPrune };
 
 // Selects scalp triangles of the head's rest pose: those whose centroid lies in the box (when given) and
@@ -114,6 +115,7 @@ struct Groom {
   UnitsOverride units;
   Attach attach;
   double attach_distance;  // [m] roots farther than this from the head are an error
+  RootOffset root_offset;
   Penetration penetration;
   Animation animation;  // attach fixed only
   std::vector<StiffnessScale> stiffness;

@@ -130,15 +130,16 @@ void contact_step(benchmark::State& run, InstructionSet set, bool near) {
   static const MeshSolid sphere(icosphere(0.1, 4), 0.004);
   kernels::SolidView solid = sphere.view();
   if (!near) solid.translation[0] = solid.translation_before[0] = 10;
-  state::AlignedVector<T> collides(bench.model.layout.batches() * kLanes, T(1));
+  state::AlignedVector<std::int32_t> skin(bench.model.layout.batches() * kLanes, kernels::kNoSkin);
   state::AlignedVector<T> figures(static_cast<std::size_t>(bench.model.layout.batches()) *
                                   kernels::kContactFigures * kLanes);
   kernels::ContactStep<T> step{bench.model.view(),
                                bench.state.view(),
                                bench.state.root_points.data(),
-                               collides.data(),
+                               skin.data(),
                                &solid,
                                1,
+                               -1,
                                T(kStep),
                                1,
                                4,

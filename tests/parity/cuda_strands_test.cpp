@@ -149,11 +149,11 @@ class Solids {
 
 TEST_F(Cuda, ContactsAgree) {
   const StrandParameters<float> parameters = default_parameters();
-  const ContactParameters contact{parameters.step, 1, 4, 3, 1e-4f};
+  const ContactParameters contact{parameters.step, 1, 4, 3, 1e-4f, 0, 0, 0, 0};
   HostGroom host(helices(100));
-  host.collides[3] = 0;
+  host.skin[3] = kIgnoresHome;
   DeviceGroom device(host);
-  device.strands->upload_collides(host.collides);
+  device.strands->upload_skin(host.skin);
   Solids solids;
   double touched = 0;
   for (int k = 0; k < 24; ++k) {
@@ -226,7 +226,7 @@ TEST_F(Cuda, WrongSizesAreRefused) {
   DeviceGroom device(host);
   const std::vector<float> few(5);
   EXPECT_THROW(device.strands->upload_state(few, host.state.velocity), CudaError);
-  EXPECT_THROW(device.strands->upload_collides(few), CudaError);
+  EXPECT_THROW(device.strands->upload_skin(std::vector<std::int32_t>(5)), CudaError);
 }
 
 TEST(CudaAbsence, IsExplained) {

@@ -71,7 +71,8 @@ inline state::StrandInput mixed_strands(int strands, unsigned seed) {
 struct HostGroom {
   state::StrandModel<float> model;
   state::StrandState<float> state;
-  state::AlignedVector<float> strand_figures, contact_figures, collides;
+  state::AlignedVector<float> strand_figures, contact_figures;
+  state::AlignedVector<std::int32_t> skin;
   int substep = 0;
 
   explicit HostGroom(const state::StrandInput& input)
@@ -79,7 +80,7 @@ struct HostGroom {
         state(model.layout),
         strand_figures(lanes() * kFigures),
         contact_figures(lanes() * kContactFigures),
-        collides(lanes(), 1.0f),
+        skin(lanes(), kernels::kNoSkin),
         scratch_(static_cast<std::size_t>(model.layout.longest()) *
                  std::max(kernels::kStepReals, kernels::kContactReals)) {
     pose_at_rest(state, model, roots(0));
@@ -119,9 +120,10 @@ struct HostGroom {
     return {.batches = model.view(),
             .state = state.view(),
             .root_points = state.root_points.data(),
-            .collides = collides.data(),
+            .skin = skin.data(),
             .solids = solids.data(),
             .solid_count = static_cast<std::int32_t>(solids.size()),
+            .home = 0,
             .step = h,
             .clamped = 1,
             .rounds = 4,

@@ -254,7 +254,7 @@ INSTANTIATE_TEST_SUITE_P(
                   {"/frames/last=25"},
                   48113,
                   192452,
-                  0.04,
+                  0,
                   8},
         RealGroom{
             "stubble", {{"/head/mesh", "face/head_morph.glb"}}, {"/frames/last=25"}, 12000, 48000, 0, 6}),

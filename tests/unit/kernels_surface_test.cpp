@@ -80,14 +80,16 @@ TYPED_TEST(KernelSurface, IsTheMeshNearTheSurface) {
   const kernels::SolidView view = solid.view();
   for (int trial = 0; trial < 4000; ++trial) {
     const Vector3d p = this->near_sphere(0.1, 0.0045);
-    const kernels::SurfaceSample<T> at = kernels::sample_surface(view, to_kernel<T>(p), T(kVoxel));
+    const kernels::SurfaceSample<T> at = kernels::sample_surface(view, to_kernel<T>(p), kernels::Patch{}, T(kVoxel));
     ASSERT_TRUE(at.exact);
     const double distance = mesh.signed_distance(p);
     ASSERT_NEAR(at.distance, distance, distance > 0 ? this->kRounding + 1e-8 : 0.1 * kVoxel);
     const Vector3d normal = from_kernel(at.normal);
     ASSERT_NEAR(normal.norm(), 1, 1e-6);
     ASSERT_NEAR(mesh.closest(p - at.distance * normal).distance, 0, this->kRounding + 1e-8);
-    if (distance > 1e-4) ASSERT_NEAR((normal - (p - mesh.closest(p).point) / distance).norm(), 0, 3e-3);
+    if (distance > 1e-4) {
+      ASSERT_NEAR((normal - (p - mesh.closest(p).point) / distance).norm(), 0, 3e-3);
+    }
     ASSERT_GT(normal.dot(p.normalized()), 0.97);
   }
 }
@@ -157,7 +159,7 @@ TYPED_TEST(KernelSurface, BlendsTwoLevelSets) {
   view.vertices_before = small.vertices.data();
   for (int trial = 0; trial < 2000; ++trial) {
     const Vector3d p = this->near_sphere(0.103, 0.0045);
-    const kernels::SurfaceSample<T> at = kernels::sample_surface(view, to_kernel<T>(p), T(0.006));
+    const kernels::SurfaceSample<T> at = kernels::sample_surface(view, to_kernel<T>(p), kernels::Patch{}, T(0.006));
     ASSERT_TRUE(at.exact);
     const double distance = mesh.signed_distance(p);
     ASSERT_NEAR(at.distance, distance, distance > 0 ? this->kRounding + 1e-8 : 6e-4);

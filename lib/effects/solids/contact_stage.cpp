@@ -13,22 +13,22 @@ template <class T>
 class ContactStage : public Stage<T> {
  public:
   ContactStage(const scene::Scene& scene, std::vector<solids::Solid>& solids,
-               const std::vector<unsigned char>& collides, const state::StrandModel<T>& model,
-               state::StrandState<T>& state)
+               const Skin& skin, const state::StrandModel<T>& model, state::StrandState<T>& state)
       : scene_(scene),
         solids_(solids),
         model_(model),
         state_(state),
         views_(solids.size()),
-        collides_(static_cast<std::size_t>(model.layout.batches()) * kLanes, T(0)),
+        home_(skin.home),
+        skin_(static_cast<std::size_t>(model.layout.batches()) * kLanes, kernels::kNoSkin),
         figures_(static_cast<std::size_t>(model.layout.batches()) * kernels::kContactFigures * kLanes) {
-    for (std::size_t strand = 0; strand < collides.size(); ++strand)
-      collides_[model.layout.at_strand(strand, 1, 0)] = collides[strand] ? T(1) : T(0);
+    for (std::size_t strand = 0; strand < skin.triangles.size(); ++strand)
+      skin_[model.layout.at_strand(strand, 1, 0)] = skin.triangles[strand];
   }
 
   std::string name() const override { return "solids"; }
   std::size_t bytes() const override {
-    std::size_t total = (collides_.size() + figures_.size()) * sizeof(T);
+    std::size_t total = skin_.size() * sizeof skin_[0] + figures_.size() * sizeof(T);
     for (const solids::Solid& solid : solids_) total += solid.bytes();
     return total;
   }
@@ -42,7 +42,8 @@ class ContactStage : public Stage<T> {
     step.batches = model_.view();
     step.state = state_.view();
     step.root_points = state_.root_points.data();
-    step.collides = collides_.data();
+    step.skin = skin_.data();
+    step.home = home_;
     step.solids = views_.data();
     step.solid_count = static_cast<std::int32_t>(views_.size());
     step.step = static_cast<T>(substep.step);
@@ -88,7 +89,9 @@ class ContactStage : public Stage<T> {
   const state::StrandModel<T>& model_;
   state::StrandState<T>& state_;
   std::vector<kernels::SolidView> views_;
-  state::AlignedVector<T> collides_, figures_;
+  std::int32_t home_;
+  state::AlignedVector<std::int32_t> skin_;
+  state::AlignedVector<T> figures_;
   std::int64_t diverged_ = -1;
 };
 
@@ -96,18 +99,18 @@ class ContactStage : public Stage<T> {
 
 template <class T>
 std::unique_ptr<Stage<T>> make_contact_stage(const scene::Scene& scene, std::vector<solids::Solid>& solids,
-                                             const std::vector<unsigned char>& collides,
+                                             const Skin& skin,
                                              const state::StrandModel<T>& model,
                                              state::StrandState<T>& state) {
-  return std::make_unique<ContactStage<T>>(scene, solids, collides, model, state);
+  return std::make_unique<ContactStage<T>>(scene, solids, skin, model, state);
 }
 
 template std::unique_ptr<Stage<float>> make_contact_stage(const scene::Scene&, std::vector<solids::Solid>&,
-                                                          const std::vector<unsigned char>&,
+                                                          const Skin&,
                                                           const state::StrandModel<float>&,
                                                           state::StrandState<float>&);
 template std::unique_ptr<Stage<double>> make_contact_stage(const scene::Scene&, std::vector<solids::Solid>&,
-                                                           const std::vector<unsigned char>&,
+                                                           const Skin&,
                                                            const state::StrandModel<double>&,
                                                            state::StrandState<double>&);
 

@@ -1,6 +1,7 @@
 // Hair against solids: level sets, friction, push-out, in turn with lengths.
 #pragma once
 #include <memory>
+#include <cstdint>
 #include <vector>
 
 #include "effects/stage.h"
@@ -9,10 +10,16 @@
 
 namespace ringlet::effects {
 
-// `collides` holds 1 for each strand that solids act on. The rest must outlive the stage.
+// What strands grow on among the solids, as kernels::ContactStep has it.
+struct Skin {
+  std::int32_t home = -1;               // index of the solid; -1: none
+  std::vector<std::int32_t> triangles;  // [strands] of that solid, or a kernels::Skin
+};
+
+// All but `skin` must outlive the stage.
 template <class T>
 std::unique_ptr<Stage<T>> make_contact_stage(const scene::Scene& scene, std::vector<solids::Solid>& solids,
-                                             const std::vector<unsigned char>& collides,
+                                             const Skin& skin,
                                              const state::StrandModel<T>& model,
                                              state::StrandState<T>& state);
 

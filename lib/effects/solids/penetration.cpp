@@ -94,7 +94,7 @@ StrandReport inspect(const Surface& surface, std::span<const Vec3> points) {
 
 PenetrationReport resolve_penetration(scene::Penetration policy, const kernels::SolidView& solid,
                                       std::span<const std::int64_t> offsets, std::span<Vec3> points,
-                                      std::span<unsigned char> collides, std::span<unsigned char> prune) {
+                                      std::span<unsigned char> ignores, std::span<unsigned char> prune) {
   const Surface surface{solid};
   const std::size_t strands = offsets.size() - 1;
   std::vector<StrandReport> reports(strands);
@@ -103,7 +103,7 @@ PenetrationReport resolve_penetration(scene::Penetration policy, const kernels::
       const std::span<Vec3> strand = points.subspan(offsets[s], offsets[s + 1] - offsets[s]);
       reports[s] = inspect(surface, strand);
       if (reports[s].buried || reports[s].too_short) {
-        collides[s] = 0;
+        ignores[s] = 1;
       } else if (policy == scene::Penetration::kPushOut) {
         push_out_strand(surface, strand);
       } else if (policy == scene::Penetration::kPrune && reports[s].inside > 0) {

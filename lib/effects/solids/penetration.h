@@ -17,10 +17,11 @@ struct PenetrationReport {
 };
 
 // One groom's strands against one solid. `points` (world, at the pose of `solid`) are moved where `policy` is
-// push_out; `collides` becomes 0 for buried strands and those too short to matter; `prune` becomes 1 for
+// push_out; `ignores` becomes 1 for buried strands and those too short to matter: they
+// are not to collide with the solid; `prune` becomes 1 for
 // strands to be left out (policy prune: those that have particles inside). Root particles stay.
 PenetrationReport resolve_penetration(scene::Penetration policy, const kernels::SolidView& solid,
                                       std::span<const std::int64_t> offsets, std::span<Vec3> points,
-                                      std::span<unsigned char> collides, std::span<unsigned char> prune);
+                                      std::span<unsigned char> ignores, std::span<unsigned char> prune);
 
 }  // namespace ringlet::effects

@@ -1,0 +1,167 @@
+// One strand against one solid: samples, the velocity a touched particle is left with, and the place where a
+// fast one entered (AMS paper 3.3; physics.md section 6).
+//
+// A particle found inside at x + h v first loses the part of its velocity that goes into the solid, with
+// Coulomb friction:    v' = v_solid + max(0, 1 - mu |u_n| / |u_t|) u_t,   u = v - v_solid and moves to x + h
+// v'; if that is still inside it is pushed out along the normal (the paper's sign pushes deeper). One that has
+// passed through the solid, or to the far side of a thin one, is taken back to where it entered and slides on
+// from there.
+#pragma once
+#include "kernels/solid/surface.h"
+#include "kernels/strand/strand_batch.h"
+
+namespace ringlet::kernels {
+inline namespace RINGLET_ISA {
+
+template <class T>
+struct LaneFigures {
+  bool touched = false;
+  T pushed = T(0);  // largest push-out of the last round
+  T strain = T(0);  // largest left
+  T rounds = T(0);
+  int swept = 0;
+};
+
+template <class T>
+struct StrandContact {
+  const SolidView& solid;
+  Vector3<T> root;         // root point in level-set axes, relative to their origin
+  Vector3<T> root_before;  // the same point against the solid's pose at the substep's start
+  T step;
+  T voxel, band;  // [m]
+  Patch skin;     // that the strand grows on
+
+  RINGLET_FUNCTION StrandContact(const SolidView& s, const double* root_point, T h)
+      : solid(s),
+        root(local(s.rotation, s.translation, root_point)),
+        root_before(local(s.rotation_before, s.translation_before, root_point)),
+        step(h),
+        voxel(static_cast<T>(s.level_set[0].voxel_size)),
+        band(static_cast<T>(s.level_set[0].background)) {}
+
+  RINGLET_FUNCTION static Vector3<T> local(const double* rotation, const double* translation,
+                                           const double* root_point) {
+    const double away[3] = {root_point[0] - translation[0], root_point[kLanes] - translation[1],
+                            root_point[2 * kLanes] - translation[2]};
+    const auto along = [&](int axis) {
+      return static_cast<T>(rotation[axis] * away[0] + rotation[3 + axis] * away[1] +
+                            rotation[6 + axis] * away[2]);
+    };
+    return {along(0), along(1), along(2)};
+  }
+
+  // In level-set coordinates; `x` relative to the root point, world axes.
+  RINGLET_FUNCTION Vector3<T> local(Vector3<T> x) const { return root + rotate_back(solid.rotation, x); }
+  RINGLET_FUNCTION Vector3<T> world(Vector3<T> p) const { return rotate(solid.rotation, p - root); }
+
+  RINGLET_FUNCTION SurfaceSample<T> sample(Vector3<T> x) const {
+    return sample_surface(solid, local(x), skin);
+  }
+  // The same where only what is well inside matters: outside the level set's word is enough.
+  RINGLET_FUNCTION SurfaceSample<T> sample_inside(Vector3<T> x) const {
+    return sample_surface(solid, local(x), skin, T(0));
+  }
+  RINGLET_FUNCTION Vector3<T> world_normal(const SurfaceSample<T>& at) const {
+    return rotate(solid.rotation, at.normal);
+  }
+
+  // Whether a strand that reaches `extent` [m] from its root over the substep may come near the solid.
+  RINGLET_FUNCTION bool within_reach(T extent) const {
+    const T reach = extent + length(root - root_before);
+    return distance_to_bounds(solid.level_set[0], root) <= reach ||
+           (solid.blend > 0.0f && distance_to_bounds(solid.level_set[1], root) <= reach);
+  }
+
+  // The velocity stage at a sample inside the solid.
+  RINGLET_FUNCTION Vector3<T> respond(const SurfaceSample<T>& at, Vector3<T> normal, Vector3<T> v) const {
+    const Vector3<T> solid_velocity = (T(1) / step) * surface_displacement(solid, at);
+    const Vector3<T> u = v - solid_velocity;
+    const T along = dot(u, normal);
+    if (along > T(0)) return v;  // separating
+    const Vector3<T> tangential = fma(-along, normal, u);
+    const T slip = length(tangential);
+    const T keep =
+        max(T(0), fma(static_cast<T>(solid.friction) * along, inverse_or_zero(slip, T(1e-12)), T(1)));
+    return fma(keep, tangential, solid_velocity);
+  }
+
+  // The particle's way over the substep as the solid sees it, level-set axes [m]. A surface that deforms takes
+  // along what is near it.
+  RINGLET_FUNCTION Vector3<T> way(Vector3<T> x, Vector3<T> v, Vector3<T> p, std::int32_t nearest) const {
+    const Vector3<T> before = root_before + rotate_back(solid.rotation_before, fma(T(0) - step, v, x));
+    const std::int32_t carrier = nearest >= 0 ? nearest : skin.triangle;
+    if (solid.vertices == solid.vertices_before || carrier < 0) return p - before;
+    return p - before - local_displacement(solid, carrier, closest_on_triangle(solid, carrier, p).barycentric);
+  }
+};
+
+// Where a particle entered the solid on its way.
+template <class T>
+struct Entry {
+  bool found = false;
+  Vector3<T> x;  // relative to the root point, world axes; just inside
+  T left;        // share of the substep that was still to come
+};
+
+// Looks along the last `way` to p for the solid. Steps as long as the distances allow find what is half a
+// voxel thick or more.
+template <class T>
+RINGLET_FUNCTION Entry<T> find_entry(const StrandContact<T>& contact, Vector3<T> p, Vector3<T> way, T distance) {
+  constexpr int kMostProbes = 256, kHalvings = 6;
+  const T least = max(T(0.5) * contact.voxel, distance / T(kMostProbes));
+  const auto depth_after = [&](T gone) {
+    return -sample_surface(contact.solid, fma(gone / distance - T(1), way, p), contact.skin).distance;
+  };
+  T outside = T(0), inside = least;
+  if (depth_after(T(0)) > T(0.25) * contact.voxel) return {};  // it was inside before
+  for (;; inside = outside + least) {
+    if (!(inside < distance)) return {};
+    const T depth = depth_after(inside);
+    if (depth > T(0)) break;
+    outside = max(inside, inside - depth - least);
+  }
+  for (int k = 0; k < kHalvings; ++k) {
+    const T middle = T(0.5) * (outside + inside);
+    (depth_after(middle) > T(0) ? inside : outside) = middle;
+  }
+  return {true, contact.world(fma(inside / distance - T(1), way, p)), T(1) - inside / distance};
+}
+
+// An entry that the sample at the particle's end does not show: it has passed through, or is nearer to the far
+// side.
+template <class T>
+RINGLET_FUNCTION Entry<T> hidden_entry(const StrandContact<T>& contact, Vector3<T> x, Vector3<T> v,
+                                       const SurfaceSample<T>& at, LaneFigures<T>& figures) {
+  const Vector3<T> p = contact.local(x), way = contact.way(x, v, p, at.triangle);
+  const T distance = length(way);
+  if (distance > contact.band) ++figures.swept;
+  if (!(distance > max(T(0.5) * contact.voxel, at.distance))) return {};
+  if (at.distance < T(0) && at.exact && !(dot(way, at.normal) > T(0))) return {};
+  return find_entry(contact, p, way, distance);
+}
+
+// The velocity and push-out stages for one particle; true where it touched.
+template <class T>
+RINGLET_FUNCTION bool collide_particle(const StrandContact<T>& contact, Vector3<T>& x, Vector3<T>& v,
+                                       Vector3<T>& normal, LaneFigures<T>& figures) {
+  SurfaceSample<T> at = contact.sample(x);
+  const Entry<T> entry = hidden_entry(contact, x, v, at, figures);
+  if (entry.found) at = contact.sample(entry.x);
+  if (!at.exact || !(entry.found || at.distance < T(0))) return false;
+  normal = contact.world_normal(at);
+  const Vector3<T> changed = contact.respond(at, normal, v);
+  if (entry.found)
+    x = entry.x + entry.left * (contact.step * changed - surface_displacement(contact.solid, at));
+  else
+    x = fma(contact.step, changed - v, x);
+  v = changed;
+  at = contact.sample(x);
+  if (at.distance < T(0) && at.exact) {
+    normal = contact.world_normal(at);
+    x = fma(-at.distance, normal, x);
+  }
+  return true;
+}
+
+}  // namespace RINGLET_ISA
+}  // namespace ringlet::kernels

@@ -20,6 +20,15 @@ struct LevelSetView {
 inline constexpr std::int32_t kTileOutside = -1;
 inline constexpr std::int32_t kTileInside = -2;
 
+// The triangles that a ray along +x may cross, binned by where it starts in the yz plane.
+struct CrossingsView {
+  float low[2];   // [m] y and z of the first bin's corner
+  float per_metre;  // bins
+  std::int32_t count[2];
+  const std::int32_t* start;     // [bins + 1] into `triangle`
+  const std::int32_t* triangle;  // in ascending order within a bin
+};
+
 struct SolidView {
   LevelSetView level_set[2];  // at the frame before and the frame after; the same for a rigid solid
   float blend;                // weight of level_set[1]; 0 for a rigid solid
@@ -38,6 +47,10 @@ struct SolidView {
   const float* vertices_before;    // [vertices][3] [m]
   const float* vertices;           // [vertices][3] [m]
   std::int32_t triangle_count;
+
+  // Where the surface passes through itself.
+  const unsigned char* folded;  // [triangles] 1 where a corner lies inside another part; null: nowhere
+  CrossingsView crossings;      // at the substep's end; only where `folded` is not null
 };
 
 }  // namespace ringlet::kernels

@@ -6,6 +6,7 @@
 // substep.
 #pragma once
 #include "kernels/solid/closest_point.h"
+#include "kernels/solid/crossings.h"
 #include "kernels/solid/level_set.h"
 
 namespace ringlet::kernels {
@@ -131,9 +132,6 @@ struct BlendedSample {
   }
 };
 
-// By how much another part of the solid must overlap a triangle for it to count as covered, in voxels.
-inline constexpr float kCoveredVoxels = 0.1f;
-
 // Where a strand grows on the solid: the level set's time-blended guess can miss that place, and does not know
 // it where another part of the solid covers it, in a fold of skin or behind a limb.
 struct Patch {
@@ -141,12 +139,17 @@ struct Patch {
   bool covered = false;
 };
 
-// Whether the triangle lies inside the solid where it is closest to p.
+// The surface of a fold is looked at this far outside it, in voxels: past the rounding of single precision,
+// nothing beside the fold's size.
+inline constexpr float kAboveVoxels = 0.01f;
+
+// Whether the triangle lies inside another part of the solid where it is closest to p.
 template <class T>
 RINGLET_FUNCTION bool is_covered(const SolidView& solid, std::int32_t triangle, Vector3<T> p) {
-  const Vector3<T> on_triangle = p - closest_on_triangle(solid, triangle, p).to_point;
-  const T limit = static_cast<T>(kCoveredVoxels * solid.level_set[0].voxel_size);
-  return BlendedSample<T>(solid, on_triangle).distance < T(0) - limit;
+  if (solid.folded == nullptr || solid.folded[triangle] == 0) return false;
+  const T above = static_cast<T>(kAboveVoxels * solid.level_set[0].voxel_size);
+  return winding_number(solid, fma(above, unit_normal<T>(solid, triangle),
+                                   p - closest_on_triangle(solid, triangle, p).to_point)) > 0;
 }
 
 // `p` in level-set coordinates at the substep's end [m]. Where the level set puts the surface farther than
@@ -182,23 +185,25 @@ RINGLET_OUTLINED SurfaceSample<T> sample_surface(const SolidView& solid, Vector3
     walk(solid, p, best);
   }
 
-  bool on_skin = false;
+  bool on_sheet = false;
   if (skin.covered && distance < T(0)) {
     ClosestPoint<T> own = closest_on_triangle(solid, skin.triangle, p);
     walk(solid, p, own);
-    on_skin = own.distance2 <= best.distance2;
-    if (on_skin) best = own;
+    on_sheet = own.distance2 <= best.distance2;
+    if (on_sheet) best = own;
   }
   const Vector3<T> out = outward(solid, best);
   const T away = sqrt(best.distance2);
   const bool far_from_zero = abs(distance) > T(0.75) * voxel;  // there the level set knows the side
-  const bool inside =
-      on_skin || level.enclosed || (far_from_zero ? distance < T(0) : dot(best.to_point, out) < T(0));
+  bool inside =
+      on_sheet || level.enclosed || (far_from_zero ? distance < T(0) : dot(best.to_point, out) < T(0));
+  if (!inside && solid.folded != nullptr && solid.folded[best.triangle] != 0)
+    on_sheet = inside = winding_number(solid, p) > 0;
   const bool touching = away < T(1e-7);  // [m] no direction of its own
   const T side = inside ? T(-1) : T(1);
   const Vector3<T> towards = touching ? out : side * best.to_point;
   sample.exact = true;
-  sample.distance = side * away - (on_skin ? T(0) : static_cast<T>(solid.offset));
+  sample.distance = side * away - (on_sheet ? T(0) : static_cast<T>(solid.offset));
   sample.normal = inverse_or_zero(length(towards), shortest_direction<T>()) * towards;
   sample.triangle = best.triangle;
   sample.barycentric = best.barycentric;

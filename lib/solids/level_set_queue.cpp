@@ -38,7 +38,7 @@ void LevelSetQueue::work() {
     lock.unlock();
     Result result;
     try {
-      result.level_set = build_(frame);
+      result.surface = build_(frame);
     } catch (...) {
       result.error = std::current_exception();
     }
@@ -48,11 +48,11 @@ void LevelSetQueue::work() {
   }
 }
 
-std::shared_ptr<const LevelSet> LevelSetQueue::wait_for(std::unique_lock<std::mutex>& lock, int frame) {
+FrameSurface LevelSetQueue::wait_for(std::unique_lock<std::mutex>& lock, int frame) {
   finished_.wait(lock, [&] { return results_.contains(frame); });
   const Result& result = results_.at(frame);
   if (result.error) std::rethrow_exception(result.error);
-  return result.level_set;
+  return result.surface;
 }
 
 LevelSetQueue::Pair LevelSetQueue::at(int frame) {
@@ -61,17 +61,17 @@ LevelSetQueue::Pair LevelSetQueue::at(int frame) {
   results_.erase(results_.begin(), results_.lower_bound(frame));
   results_.erase(results_.upper_bound(frame + 1 + kAhead), results_.end());
   wanted_.notify_one();
-  std::shared_ptr<const LevelSet> before = wait_for(lock, frame);
+  FrameSurface before = wait_for(lock, frame);
   return {std::move(before), wait_for(lock, frame + 1)};
 }
 
 std::size_t LevelSetQueue::bytes() const {
   const std::lock_guard lock(mutex_);
   std::set<const LevelSet*> held;
-  for (const auto& [frame, result] : results_)
-    if (result.level_set) held.insert(result.level_set.get());
   std::size_t sum = 0;
-  for (const LevelSet* level_set : held) sum += level_set->bytes();
+  for (const auto& [frame, result] : results_)
+    if (held.insert(result.surface.level_set.get()).second && result.surface.level_set)
+      sum += result.surface.bytes();
   return sum;
 }
 

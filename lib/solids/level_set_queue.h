@@ -12,9 +12,17 @@
 
 namespace ringlet::solids {
 
+// A deforming solid's surface at a frame.
+struct FrameSurface {
+  std::shared_ptr<const LevelSet> level_set;
+  std::shared_ptr<const std::vector<unsigned char>> folded;  // folded_triangles; null: none
+
+  std::size_t bytes() const { return level_set->bytes() + (folded ? folded->size() : 0); }
+};
+
 class LevelSetQueue {
  public:
-  using Build = std::function<std::shared_ptr<const LevelSet>(int frame)>;
+  using Build = std::function<FrameSurface(int frame)>;
 
   // `build` runs on the queue's thread alone, for one frame after another. Building starts with `first`;
   // nothing later than `last` is built ahead of being asked for.
@@ -22,7 +30,7 @@ class LevelSetQueue {
   ~LevelSetQueue();
 
   struct Pair {
-    std::shared_ptr<const LevelSet> before, after;
+    FrameSurface before, after;
   };
 
   // Those of `frame` and the next one; waits for them. Earlier ones are let go. Throws what `build` threw.
@@ -32,12 +40,12 @@ class LevelSetQueue {
 
  private:
   struct Result {
-    std::shared_ptr<const LevelSet> level_set;
+    FrameSurface surface;
     std::exception_ptr error;
   };
   int next_wanted() const;  // the frame to build next, or kNone; under the lock
   void work();
-  std::shared_ptr<const LevelSet> wait_for(std::unique_lock<std::mutex>& lock, int frame);
+  FrameSurface wait_for(std::unique_lock<std::mutex>& lock, int frame);
 
   const Build build_;
   const int last_;

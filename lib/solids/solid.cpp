@@ -9,6 +9,7 @@
 #include "core/error.h"
 #include "core/log.h"
 #include "core/timer.h"
+#include "solids/folds.h"
 #include "solids/level_set_cache.h"
 #include "solids/level_set_queue.h"
 #include "solids/surface.h"
@@ -98,16 +99,35 @@ struct Solid::Impl {
                   ": the surface encloses no volume that its voxels can see; hair will not collide with it");
   }
 
+  FrameSurface surface_of(const Vertices& now) const {
+    std::vector<unsigned char> folds = folded_triangles(surface, now, options.voxel_size);
+    return {cached_level_set(surface, now, options),
+            folds.empty() ? nullptr : std::make_shared<const std::vector<unsigned char>>(std::move(folds))};
+  }
+
+  void find_folds() {
+    folded.clear();
+    for (const auto& of_frame : {pair.before.folded, pair.after.folded}) {
+      if (!of_frame) continue;
+      folded.resize(of_frame->size(), 0);
+      for (std::size_t t = 0; t < folded.size(); ++t) folded[t] |= (*of_frame)[t];
+    }
+    view.folded = folded.empty() ? nullptr : folded.data();
+  }
+
   // ---- Still and rigid --------------------------------------------------------------------------
 
   void build_once() {
     const Timer timer;
     vertices = local(mesh.rest_vertices());
-    pair.before = pair.after = cached_level_set(surface, vertices, options);
+    pair.before = pair.after = surface_of(vertices);
     log_info(fmt::format("{}: level set of {} tiles, voxels of {:g} m, {:.1f} MB, {:.2f} s", name,
-                         pair.before->distance.size() / 512, options.voxel_size, 1e-6 * pair.before->bytes(),
+                         pair.before.level_set->distance.size() / 512, options.voxel_size,
+                         1e-6 * pair.before.bytes(),
                          timer.seconds()));
-    warn_if_empty(*pair.before);
+    warn_if_empty(*pair.before.level_set);
+    find_folds();
+    if (!folded.empty()) crossings.build(vertices, surface.triangles), view.crossings = crossings.view();
     show(pair, 0);
     view.vertices_before = view.vertices = vertices.front().data();
   }
@@ -122,27 +142,28 @@ struct Solid::Impl {
   // ---- Deforming --------------------------------------------------------------------------------
 
   // On the queue's thread. A frame that looks like the last one built shares its level set.
-  std::shared_ptr<const LevelSet> build_frame(int frame) {
+  FrameSurface build_frame(int frame) {
     Vertices now = local_at(frame / fps);
-    if (last_built && now == last_built_vertices) return last_built;
+    if (last_built.level_set && now == last_built_vertices) return last_built;
     const Timer timer;
-    last_built = cached_level_set(surface, now, options);
-    if (last_built_vertices.empty()) warn_if_empty(*last_built);
+    last_built = surface_of(now);
+    if (last_built_vertices.empty()) warn_if_empty(*last_built.level_set);
     log_debug(fmt::format("{}: level set {} frames after the first, {:.1f} MB, {:.2f} s", name, frame,
-                          1e-6 * last_built->bytes(), timer.seconds()));
+                          1e-6 * last_built.bytes(), timer.seconds()));
     last_built_vertices = std::move(now);
     return last_built;
   }
 
   void place_deforming(double time_before, double time) {
     const int now = frame_of(time_before);
-    if (!frame || *frame != now) pair = queue->at(now);
+    if (!frame || *frame != now) pair = queue->at(now), find_folds();
     frame = now;
     show(pair, std::clamp(time * fps - now, 0.0, 1.0));
     if (!vertices_time || *vertices_time != time_before) vertices = local_at(time_before);
     vertices_before.swap(vertices);
     vertices = local_at(time);
     vertices_time = time;
+    if (!folded.empty()) crossings.build(vertices, surface.triangles), view.crossings = crossings.view();
     view.vertices_before = vertices_before.front().data();
     view.vertices = vertices.front().data();
     set_placement(view.rotation_before, view.translation_before, Mat3::Identity(), origin);
@@ -150,14 +171,15 @@ struct Solid::Impl {
   }
 
   void show(const LevelSetQueue::Pair& level_sets, double blend) {
-    view.level_set[0] = level_sets.before->view();
-    view.level_set[1] = level_sets.after->view();
+    view.level_set[0] = level_sets.before.level_set->view();
+    view.level_set[1] = level_sets.after.level_set->view();
     view.blend = static_cast<float>(blend);
   }
 
   std::size_t bytes() const {
     return (vertices.size() + vertices_before.size()) * sizeof(Eigen::Vector3f) +
-           surface.triangles.size() * sizeof(Triangle) + (queue ? queue->bytes() : pair.before->bytes());
+           surface.triangles.size() * sizeof(Triangle) + crossings.bytes() + folded.size() +
+           (queue ? queue->bytes() : pair.before.bytes());
   }
 
   const std::string name;
@@ -168,12 +190,14 @@ struct Solid::Impl {
   LevelSetOptions options;
   kernels::SolidView view{};
   LevelSetQueue::Pair pair;
+  std::vector<unsigned char> folded;  // in either of `pair`; empty: none
+  Crossings crossings;                // where `folded` is not empty
   Vertices vertices, vertices_before;  // at the substep's end and start
 
   std::optional<int> frame;             // whose level sets `pair` holds (deforming)
   std::optional<double> vertices_time;  // of `vertices` (deforming)
   Vertices last_built_vertices;         // the queue's thread alone
-  std::shared_ptr<const LevelSet> last_built;
+  FrameSurface last_built;
   std::optional<LevelSetQueue> queue;  // last: its thread uses the others
 };
 

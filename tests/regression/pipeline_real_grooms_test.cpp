@@ -27,6 +27,7 @@ constexpr double kInside = 0.75;       // winding number; about a half in the op
 constexpr double kDepth = 0.5e-3;      // [m] deepest that a particle may end a frame inside the mesh
 constexpr double kFreeStrain = 1e-3;   // of strands that no solid moved
 constexpr double kMovedStrain = 1e-2;  // of those that one did, 99.9th percentile
+constexpr double kShortestSegment = 1e-6;  // [m] shorter ones are not held to their lengths
 constexpr double kRounding = 4e-7;     // of a length between points in single precision, of their coordinates
 constexpr double kStrainRounding = 2e-5;
 
@@ -122,7 +123,7 @@ class FrameChecks {
         const double now = (point(frame.position, i + 1) - point(frame.position, i)).norm(),
                      rest = rest_edge(i);
         const double rounding = kRounding * point(frame.position, i).norm();
-        if (rest > 0) strain[s] = std::max(strain[s], (std::abs(now - rest) - rounding) / rest);
+        if (rest >= kShortestSegment) strain[s] = std::max(strain[s], (std::abs(now - rest) - rounding) / rest);
       }
     });
     if (frame.number == header_.first_frame) return;  // not stepped yet: no figures

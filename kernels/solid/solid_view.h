@@ -49,7 +49,7 @@ struct SolidView {
   std::int32_t triangle_count;
 
   // Where the surface passes through itself.
-  const unsigned char* folded;  // [triangles] 1 where a corner lies inside another part; null: nowhere
+  const unsigned char* folded;  // [triangles] 1 where a part of it may lie inside another; null: nowhere
   CrossingsView crossings;      // at the substep's end; only where `folded` is not null
 };
 

@@ -106,9 +106,24 @@ RINGLET_FUNCTION Vector3<T> outward(const SolidView& solid, const ClosestPoint<T
   return sum;
 }
 
-// How near the level set must say the surface is for the exact mesh to be asked, in voxels: its samples are
-// exact, and between them a trilinear value is off by less than this even across a sharp edge.
-inline constexpr float kNearVoxels = 0.5f;
+// The side of the surface that a point is on, told by the closest point alone.
+template <class T>
+struct Side {
+  Vector3<T> outward;  // of any length
+  T distance;          // [m] negative where the point is behind the surface
+};
+template <class T>
+RINGLET_FUNCTION Side<T> side_of(const SolidView& solid, const ClosestPoint<T>& at) {
+  const Vector3<T> out = outward(solid, at);
+  const T away = sqrt(at.distance2);
+  return {out, dot(at.to_point, out) < T(0) ? T(0) - away : away};
+}
+
+// How near the level set must say the surface is for the exact mesh to be asked, in voxels. Its samples are
+// exact; where the surface lies between a point and a corner of its cell, that corner's distance is no more than
+// the corner is away, and the trilinear mean of these ways is at most half a cell's diagonal. Beyond it the level
+// set knows the side, however thin the solid.
+inline constexpr float kNearVoxels = 0.867f;
 
 // By how much the exact distance may differ from the level set's before it is doubted, in voxels.
 inline constexpr float kDoubtVoxels = 0.1f;
@@ -175,33 +190,36 @@ RINGLET_OUTLINED SurfaceSample<T> sample_surface(const SolidView& solid, Vector3
   }
   if (best.triangle < 0) return sample;
   walk(solid, p, best);
-  // The walk can end where another fold of the surface is closer still. Then it disagrees with the level set:
+  // The walk can end where another part of the surface is closer still. Then it disagrees with the level set:
   // ask the triangles of the whole cell.
-  if (abs(sqrt(best.distance2) - abs(distance)) > static_cast<T>(kDoubtVoxels) * voxel) {
+  const auto differs = [&](const Side<T>& told) {
+    return abs(told.distance - distance) > static_cast<T>(kDoubtVoxels) * voxel;
+  };
+  Side<T> told = side_of(solid, best);
+  if (differs(told)) {
     for (int corner = 0; corner < kCorners; ++corner) {
       consider(solid, corner_triangle(solid.level_set[0], p, corner), p, best);
       if (solid.blend > 0.0f) consider(solid, corner_triangle(solid.level_set[1], p, corner), p, best);
     }
     walk(solid, p, best);
+    told = side_of(solid, best);
   }
-
   bool on_sheet = false;
   if (skin.covered && distance < T(0)) {
     ClosestPoint<T> own = closest_on_triangle(solid, skin.triangle, p);
     walk(solid, p, own);
     on_sheet = own.distance2 <= best.distance2;
-    if (on_sheet) best = own;
+    if (on_sheet) best = own, told = side_of(solid, best);
   }
-  const Vector3<T> out = outward(solid, best);
-  const T away = sqrt(best.distance2);
-  const bool far_from_zero = abs(distance) > T(0.75) * voxel;  // there the level set knows the side
-  bool inside =
-      on_sheet || level.enclosed || (far_from_zero ? distance < T(0) : dot(best.to_point, out) < T(0));
-  if (!inside && solid.folded != nullptr && solid.folded[best.triangle] != 0)
+  bool inside = on_sheet || level.enclosed || told.distance < T(0) ||
+                distance < T(0) - static_cast<T>(kNearVoxels) * voxel;
+  if (!inside && solid.folded != nullptr &&
+      (distance < T(0) || solid.folded[best.triangle] != 0 || differs(told)))
     on_sheet = inside = winding_number(solid, p) > 0;
+  const T away = abs(told.distance);
   const bool touching = away < T(1e-7);  // [m] no direction of its own
   const T side = inside ? T(-1) : T(1);
-  const Vector3<T> towards = touching ? out : side * best.to_point;
+  const Vector3<T> towards = touching ? told.outward : side * best.to_point;
   sample.exact = true;
   sample.distance = side * away - (on_sheet ? T(0) : static_cast<T>(solid.offset));
   sample.normal = inverse_or_zero(length(towards), shortest_direction<T>()) * towards;

@@ -1,0 +1,55 @@
+// How often a solid's surface winds round a point: the signed crossings of the ray from the point along +x.
+// Exact for a closed surface, one that passes through itself too, where the closest triangle alone does not
+// tell inside from outside: a point above one fold of skin may be inside another.
+#pragma once
+#include "kernels/backend/vector.h"
+#include "kernels/solid/solid_view.h"
+
+namespace ringlet::kernels {
+inline namespace RINGLET_ISA {
+
+// Twice the signed area of p, a, b in the yz plane; rounding changes sign with the order of a and b, so that
+// of two triangles that share an edge a ray crosses just one.
+template <class T>
+RINGLET_FUNCTION T crossing_side(Vector3<T> a, Vector3<T> b) {
+  const T left = a.y * b.z, right = a.z * b.y;
+  return left - right;
+}
+
+// 1 where the ray from the origin along +x leaves through the triangle, -1 where it enters, 0 where it misses.
+template <class T>
+RINGLET_FUNCTION int crossing(Vector3<T> a, Vector3<T> b, Vector3<T> c, const std::int32_t* vertex) {
+  const auto positive = [](T side, std::int32_t from, std::int32_t to) {
+    return side > T(0) || (side == T(0) && from < to);  // a ray through an edge belongs to one side of it
+  };
+  const bool ab = positive(crossing_side(a, b), vertex[0], vertex[1]),
+             bc = positive(crossing_side(b, c), vertex[1], vertex[2]),
+             ca = positive(crossing_side(c, a), vertex[2], vertex[0]);
+  if (ab != bc || bc != ca) return 0;
+  const bool ahead = (dot(a, cross(b, c)) > T(0)) == ab;
+  return !ahead ? 0 : ab ? 1 : -1;
+}
+
+// `p` in level-set coordinates [m]. Positive inside; 0 outside.
+template <class T>
+RINGLET_FUNCTION int winding_number(const SolidView& solid, Vector3<T> p) {
+  const CrossingsView& bins = solid.crossings;
+  const T y = (p.y - static_cast<T>(bins.low[0])) * static_cast<T>(bins.per_metre),
+          z = (p.z - static_cast<T>(bins.low[1])) * static_cast<T>(bins.per_metre);
+  if (!(y >= T(0) && z >= T(0) && y < static_cast<T>(bins.count[0]) && z < static_cast<T>(bins.count[1])))
+    return 0;
+  const std::int32_t bin = static_cast<std::int32_t>(y) * bins.count[1] + static_cast<std::int32_t>(z);
+  int sum = 0;
+  for (std::int32_t k = bins.start[bin]; k < bins.start[bin + 1]; ++k) {
+    const std::int32_t* v = solid.triangles + 3 * static_cast<std::int64_t>(bins.triangle[k]);
+    const auto corner = [&](int c) {
+      const float* x = solid.vertices + 3 * static_cast<std::int64_t>(v[c]);
+      return Vector3<T>{static_cast<T>(x[0]), static_cast<T>(x[1]), static_cast<T>(x[2])} - p;
+    };
+    sum += crossing(corner(0), corner(1), corner(2), v);
+  }
+  return sum;
+}
+
+}  // namespace RINGLET_ISA
+}  // namespace ringlet::kernels

@@ -30,7 +30,7 @@ RINGLET_FUNCTION int crossing(Vector3<T> a, Vector3<T> b, Vector3<T> c, const st
   return !ahead ? 0 : ab ? 1 : -1;
 }
 
-// `p` in level-set coordinates [m]. Positive inside; 0 outside.
+// `p` in level-set coordinates [m]. 0 outside; negative where skin has turned inside out.
 template <class T>
 RINGLET_FUNCTION int winding_number(const SolidView& solid, Vector3<T> p) {
   const CrossingsView& bins = solid.crossings;

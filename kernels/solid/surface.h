@@ -164,7 +164,7 @@ RINGLET_FUNCTION bool is_covered(const SolidView& solid, std::int32_t triangle, 
   if (solid.folded == nullptr || solid.folded[triangle] == 0) return false;
   const T above = static_cast<T>(kAboveVoxels * solid.level_set[0].voxel_size);
   return winding_number(solid, fma(above, unit_normal<T>(solid, triangle),
-                                   p - closest_on_triangle(solid, triangle, p).to_point)) > 0;
+                                   p - closest_on_triangle(solid, triangle, p).to_point)) != 0;
 }
 
 // `p` in level-set coordinates at the substep's end [m]. Where the level set puts the surface farther than
@@ -215,7 +215,7 @@ RINGLET_OUTLINED SurfaceSample<T> sample_surface(const SolidView& solid, Vector3
                 distance < T(0) - static_cast<T>(kNearVoxels) * voxel;
   if (!inside && solid.folded != nullptr &&
       (distance < T(0) || solid.folded[best.triangle] != 0 || differs(told)))
-    on_sheet = inside = winding_number(solid, p) > 0;
+    on_sheet = inside = winding_number(solid, p) != 0;
   const T away = abs(told.distance);
   const bool touching = away < T(1e-7);  // [m] no direction of its own
   const T side = inside ? T(-1) : T(1);

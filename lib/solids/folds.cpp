@@ -125,7 +125,7 @@ std::vector<unsigned char> folded_triangles(const ClosedSurface& surface, std::s
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, vertices.size(), 256), [&](const auto& range) {
     for (std::size_t v = range.begin(); v != range.end(); ++v) {
       const Vector3f above = vertices[v] + kernels::kAboveVoxels * voxel_size * normals[v];
-      covered[v] = kernels::winding_number(solid, kernels::Vector3<float>{above.x(), above.y(), above.z()}) > 0;
+      covered[v] = kernels::winding_number(solid, kernels::Vector3<float>{above.x(), above.y(), above.z()}) != 0;
     }
   });
   std::vector<std::atomic<unsigned char>> found(surface.triangles.size());

@@ -91,18 +91,8 @@ class FrameChecks {
     return header_.metres_per_unit * MeshDistance::Vec3(from[3 * i], from[3 * i + 1], from[3 * i + 2]);
   }
 
-  // The head as posed, and with its openings closed: an open mesh has no inside of its own.
-  struct Head {
-    MeshDistance mesh, closed;
-
-    // How deep a point is inside, 0 outside and where it is no deeper than `ask` [m].
-    double depth(const MeshDistance::Vec3& x, double ask) const {
-      const double distance = mesh.closest(x).distance;
-      return distance > ask && closed.inside(x) ? distance : 0;
-    }
-  };
-
-  Head posed_head(const state::Frame& frame) const {
+  // The head as posed, its openings closed: an open mesh has no inside of its own.
+  MeshDistance posed_head(const state::Frame& frame) const {
     const std::vector<float>& coordinates = frame.surface_vertices.at(0);
     std::vector<MeshDistance::Vec3> vertices;
     for (std::size_t v = 0; v < coordinates.size() / 3; ++v)
@@ -110,7 +100,7 @@ class FrameChecks {
     const std::vector<std::int32_t>& t = header_.surfaces.at(0).triangles;
     std::vector<MeshDistance::Triangle> triangles;
     for (std::size_t k = 0; k < t.size(); k += 3) triangles.push_back({t[k], t[k + 1], t[k + 2]});
-    return {MeshDistance(vertices, triangles), oracle::with_openings_closed(vertices, triangles)};
+    return oracle::with_openings_closed(std::move(vertices), std::move(triangles));
   }
 
   double rest_edge(std::int64_t i) const {
@@ -118,11 +108,11 @@ class FrameChecks {
   }
 
   // Strands whose root lies deeper than they are long.
-  void find_buried(const state::Frame& frame, const Head& head) {
+  void find_buried(const state::Frame& frame, const MeshDistance& head) {
     for_each_strand([&](std::size_t s) {
       double length = 0;
       for (auto i = header_.offsets[s]; i + 1 < header_.offsets[s + 1]; ++i) length += rest_edge(i);
-      buried_[s] = head.depth(point(frame.position, header_.offsets[s]), 0) > 0.999 * length;
+      buried_[s] = -head.signed_distance(point(frame.position, header_.offsets[s])) > 0.999 * length;
     });
   }
 
@@ -157,7 +147,7 @@ class FrameChecks {
 
   // No particle deep inside, roots and their neighbours aside.
   void check_depth(const state::Frame& frame) {
-    const Head head = posed_head(frame);
+    const MeshDistance head = posed_head(frame);
     find_buried(frame, head);
     std::atomic<int> deep = 0;
     std::mutex mutex;
@@ -165,8 +155,9 @@ class FrameChecks {
     for_each_strand([&](std::size_t s) {
       if (buried_[s]) return;
       for (auto i = header_.offsets[s] + 2; i < header_.offsets[s + 1]; ++i) {
-        const double depth = head.depth(point(frame.position, i), asked);
-        if (depth == 0) continue;
+        const MeshDistance::Vec3 x = point(frame.position, i);
+        const double depth = head.closest(x).distance;
+        if (depth <= asked || !head.inside(x)) continue;
         deep += !(depth <= kDepth);
         const std::lock_guard lock(mutex);
         deepest_ = std::max(deepest_, depth);

@@ -41,13 +41,13 @@ class CudaSolid {
     if (stale || moving || moved || host.vertices != last_.vertices)
       vertices_.upload({host.vertices, 3 * vertex_count_}, stream);
     if (moving) vertices_before_.upload({host.vertices_before, 3 * vertex_count_}, stream);
-    if (host.folded != nullptr && (stale || moving || moved)) upload_crossings(host.crossings, stream);
+    if (host.crossings.start != nullptr && (stale || moving || moved)) upload_crossings(host.crossings, stream);
     last_ = host, interval_ = interval;
     return view(host);
   }
   std::size_t bytes() const {
     return level_set_[0].bytes() + level_set_[1].bytes() + triangles_.bytes() + neighbours_.bytes() +
-           vertices_.bytes() + vertices_before_.bytes() + folded_.bytes() + bin_start_.bytes() +
+           vertices_.bytes() + vertices_before_.bytes() + bin_start_.bytes() +
            bin_triangle_.bytes();
   }
 
@@ -62,7 +62,7 @@ class CudaSolid {
     };
     return same_set(s.level_set[0], last_.level_set[0]) && same_set(s.level_set[1], last_.level_set[1]) &&
            s.triangles == last_.triangles && s.neighbours == last_.neighbours &&
-           s.triangle_count == last_.triangle_count && s.folded == last_.folded;
+           s.triangle_count == last_.triangle_count;
   }
   void upload_surface(const SolidView& host, cudaStream_t stream) {
     level_set_[0].upload(host.level_set[0], stream);
@@ -70,7 +70,6 @@ class CudaSolid {
     const std::span triangles(host.triangles, 3 * std::size_t(host.triangle_count));
     triangles_.upload(triangles, stream);
     neighbours_.upload({host.neighbours, triangles.size()}, stream);
-    if (host.folded != nullptr) folded_.upload({host.folded, std::size_t(host.triangle_count)}, stream);
     vertex_count_ = triangles.empty() ? 0 : std::size_t(*std::ranges::max_element(triangles)) + 1;
   }
   void upload_crossings(const CrossingsView& host, cudaStream_t stream) {
@@ -84,8 +83,7 @@ class CudaSolid {
     host.vertices_before = deforms(host) ? vertices_before_.data() : vertices_.data();
     host.vertices = vertices_.data();
     host.triangles = triangles_.data(), host.neighbours = neighbours_.data();
-    if (host.folded == nullptr) return host;
-    host.folded = folded_.data();
+    if (host.crossings.start == nullptr) return host;
     host.crossings.start = bin_start_.data(), host.crossings.triangle = bin_triangle_.data();
     return host;
   }
@@ -94,7 +92,6 @@ class CudaSolid {
   std::int64_t interval_ = 0;
   CudaLevelSet level_set_[2];
   DeviceBuffer<std::int32_t> triangles_, neighbours_, bin_start_, bin_triangle_;
-  DeviceBuffer<unsigned char> folded_;
   DeviceBuffer<float> vertices_, vertices_before_;
   std::size_t vertex_count_ = 0;
 };

@@ -48,9 +48,7 @@ struct SolidView {
   const float* vertices;           // [vertices][3] [m]
   std::int32_t triangle_count;
 
-  // Where the surface passes through itself.
-  const unsigned char* folded;  // [triangles] 1 where a part of it may lie inside another; null: nowhere
-  CrossingsView crossings;      // at the substep's end; only where `folded` is not null
+  CrossingsView crossings;  // at the substep's end, where the surface passes through itself; else null
 };
 
 }  // namespace ringlet::kernels

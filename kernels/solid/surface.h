@@ -161,7 +161,7 @@ inline constexpr float kAboveVoxels = 0.01f;
 // Whether the triangle lies inside another part of the solid where it is closest to p.
 template <class T>
 RINGLET_FUNCTION bool is_covered(const SolidView& solid, std::int32_t triangle, Vector3<T> p) {
-  if (solid.folded == nullptr || solid.folded[triangle] == 0) return false;
+  if (solid.crossings.start == nullptr) return false;
   const T above = static_cast<T>(kAboveVoxels * solid.level_set[0].voxel_size);
   return winding_number(solid, fma(above, unit_normal<T>(solid, triangle),
                                    p - closest_on_triangle(solid, triangle, p).to_point)) != 0;
@@ -192,11 +192,8 @@ RINGLET_OUTLINED SurfaceSample<T> sample_surface(const SolidView& solid, Vector3
   walk(solid, p, best);
   // The walk can end where another part of the surface is closer still. Then it disagrees with the level set:
   // ask the triangles of the whole cell.
-  const auto differs = [&](const Side<T>& told) {
-    return abs(told.distance - distance) > static_cast<T>(kDoubtVoxels) * voxel;
-  };
   Side<T> told = side_of(solid, best);
-  if (differs(told)) {
+  if (abs(told.distance - distance) > static_cast<T>(kDoubtVoxels) * voxel) {
     for (int corner = 0; corner < kCorners; ++corner) {
       consider(solid, corner_triangle(solid.level_set[0], p, corner), p, best);
       if (solid.blend > 0.0f) consider(solid, corner_triangle(solid.level_set[1], p, corner), p, best);
@@ -213,9 +210,7 @@ RINGLET_OUTLINED SurfaceSample<T> sample_surface(const SolidView& solid, Vector3
   }
   bool inside = on_sheet || level.enclosed || told.distance < T(0) ||
                 distance < T(0) - static_cast<T>(kNearVoxels) * voxel;
-  if (!inside && solid.folded != nullptr &&
-      (distance < T(0) || solid.folded[best.triangle] != 0 || differs(told)))
-    on_sheet = inside = winding_number(solid, p) != 0;
+  if (!inside && solid.crossings.start != nullptr) on_sheet = inside = winding_number(solid, p) != 0;
   const T away = abs(told.distance);
   const bool touching = away < T(1e-7);  // [m] no direction of its own
   const T side = inside ? T(-1) : T(1);

@@ -79,11 +79,25 @@ std::optional<groom::Attachment> attach(const World& world, const scene::Groom& 
   return groom::Attachment::to_head(strands, scalp_of(*world.head), desc);
 }
 
+// The triangles of the home solid that strands grow on. Its surface begins with the head's triangles; on a proxy
+// it is the one nearest in the rest pose.
+std::vector<std::int32_t> find_skin(const scene::Scene& scene, const World& world,
+                                    const groom::Attachment* attachment, const groom::Strands& strands) {
+  std::vector<std::int32_t> skin(strands.size(), kernels::kNoSkin);
+  if (!attachment) return skin;
+  std::optional<groom::ClosestTriangle> proxy;
+  if (scene.effects.solids[static_cast<std::size_t>(world.skin.home)].proxy)
+    proxy.emplace(world.home_mesh->rest_vertices(), world.home_mesh->triangles());
+  for (std::size_t s = 0; s < skin.size(); ++s)
+    skin[s] = proxy ? proxy->find(strands.points[strands.offsets[s]]).triangle : attachment->sites()[s].triangle;
+  return skin;
+}
+
 // Moves what starts inside the head out of it, in the rest shape; says how much that was.
 void clear_head(const scene::Scene& scene, const scene::Groom& desc, World& world, groom::Strands& strands,
-                std::optional<groom::Attachment>& attachment, std::vector<unsigned char>& ignores) {
-  ignores.assign(strands.size(), 0);
+                std::optional<groom::Attachment>& attachment, std::vector<std::int32_t>& skin) {
   if (world.skin.home < 0) return;
+  skin = find_skin(scene, world, attachment ? &*attachment : nullptr, strands);
 
   const std::vector<Vec3> rest = root_points(strands);
   const std::vector<Pose> poses = first_poses(world, scene, desc, attachment, rest);
@@ -96,7 +110,7 @@ void clear_head(const scene::Scene& scene, const scene::Groom& desc, World& worl
   const double time = first_time(scene.frames);
   const effects::PenetrationReport report = effects::resolve_penetration(
       desc.penetration, world.solids[static_cast<std::size_t>(world.skin.home)].at(time, time),
-      strands.offsets, points, ignores, prune);
+      strands.offsets, points, skin, prune);
   for (std::size_t s = 0; s < strands.size(); ++s)
     for (auto i = strands.offsets[s]; i < strands.offsets[s + 1]; ++i)
       if (points[i] != posed[i])
@@ -116,37 +130,14 @@ void clear_head(const scene::Scene& scene, const scene::Groom& desc, World& worl
                     desc.name, report.buried));
   if (std::find(prune.begin(), prune.end(), 1) == prune.end()) return;
   strands = without(strands, prune);
-  std::vector<unsigned char> kept;
+  std::vector<std::int32_t> kept;
   for (std::size_t s = 0; s < prune.size(); ++s)
-    if (!prune[s]) kept.push_back(ignores[s]);
-  ignores = std::move(kept);
+    if (!prune[s]) kept.push_back(skin[s]);
+  skin = std::move(kept);
   if (strands.size() == 0)
     throw Error(ErrorKind::kInput, desc.pointer, "every strand starts inside the head and was pruned",
                 "use \"penetration\": \"push_out\", or check units and up axis");
   attachment = attach(world, desc, strands);
-}
-
-// Roots on the head grow on its collision surface, whose first triangles are the head's; on a proxy, on the
-// triangle nearest in the rest pose.
-void append_skin(const scene::Scene& scene, const groom::Attachment* attachment,
-                 const groom::Strands& strands, const std::vector<unsigned char>& ignores, World& world) {
-  std::vector<std::int32_t>& skin = world.skin.triangles;
-  if (world.skin.home < 0) return;
-  const scene::Solid& home = scene.effects.solids[static_cast<std::size_t>(world.skin.home)];
-  std::optional<groom::ClosestTriangle> proxy;
-  if (home.proxy) {
-    const solids::AnimatedMesh& mesh = *world.home_mesh;
-    proxy.emplace(mesh.rest_vertices(), mesh.triangles());
-  }
-  for (std::size_t s = 0; s < strands.size(); ++s) {
-    if (ignores[s])
-      skin.push_back(kernels::kIgnoresHome);
-    else if (!attachment)
-      skin.push_back(kernels::kNoSkin);
-    else
-      skin.push_back(proxy ? proxy->find(strands.points[strands.offsets[s]]).triangle
-                           : attachment->sites()[s].triangle);
-  }
 }
 
 double sample_curve(const scene::Curve& curve, double x) {
@@ -201,9 +192,9 @@ void build_groom(const scene::Scene& scene, std::size_t index, bool scales_stiff
   groom::Strands strands = groom::build(desc, scene.units, scalp ? &*scalp : nullptr);
   if (strands.widths.empty()) strands.widths.assign(strands.points.size(), static_cast<float>(desc.width));
   std::optional<groom::Attachment> attachment = attach(world, desc, strands);
-  std::vector<unsigned char> ignores;
-  clear_head(scene, desc, world, strands, attachment, ignores);
-  append_skin(scene, attachment ? &*attachment : nullptr, strands, ignores, world);
+  std::vector<std::int32_t> skin;
+  clear_head(scene, desc, world, strands, attachment, skin);
+  world.skin.triangles.insert(world.skin.triangles.end(), skin.begin(), skin.end());
   if (scales_stiffness) append_stiffness(scene, desc, strands, world.stiffness);
   append(strands, static_cast<std::int32_t>(index), world);
   if (attachment) {

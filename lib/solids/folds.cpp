@@ -37,22 +37,38 @@ bool pierces(const Vector3f& from, const Vector3f& to, const std::array<Vector3f
   return (normal.dot(a) > 0) != (normal.dot(corners[0] - to) > 0);
 }
 
-// Marks the triangles that another's edge pierces, and the edge's own.
-void find_pierced(const ClosedSurface& surface, std::span<const Vector3f> vertices, const Crossings& crossings,
-                  std::vector<std::atomic<unsigned char>>& folded) {
+// Whether a test holds for any of [0, count); the rest is not looked at once one has been found.
+bool any_of(std::size_t count, const auto& test) {
+  std::atomic<bool> found = false;
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 256), [&](const auto& range) {
+    for (std::size_t i = range.begin(); i != range.end() && !found; ++i)
+      if (test(i)) found = true;
+  });
+  return found;
+}
+
+bool any_covered(std::span<const Vector3f> vertices, std::span<const Vector3f> normals,
+                 const kernels::SolidView& solid, float above) {
+  return any_of(vertices.size(), [&](std::size_t v) {
+    const Vector3f x = vertices[v] + above * normals[v];
+    return kernels::winding_number(solid, kernels::Vector3<float>{x.x(), x.y(), x.z()}) != 0;
+  });
+}
+
+bool any_pierced(const ClosedSurface& surface, std::span<const Vector3f> vertices, const Crossings& crossings) {
   const auto at = [&](std::int32_t v) -> const Vector3f& { return vertices[static_cast<std::size_t>(v)]; };
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, folded.size(), 256), [&](const auto& range) {
-    for (std::size_t t = range.begin(); t != range.end(); ++t)
-      for (std::size_t k = 0; k < 3; ++k) {
-        const std::int32_t from = surface.triangles[t][k], to = surface.triangles[t][(k + 1) % 3];
-        if (from > to && surface.neighbours[3 * t + k] >= 0) continue;  // the neighbour looks at it
-        crossings.for_each_near(at(from), at(to), [&](std::int32_t other) {
-          const Triangle& v = surface.triangles[static_cast<std::size_t>(other)];
-          if (std::ranges::find(v, from) != v.end() || std::ranges::find(v, to) != v.end()) return;
-          if (pierces(at(from), at(to), {at(v[0]), at(v[1]), at(v[2])}))
-            folded[t] = 1, folded[static_cast<std::size_t>(other)] = 1;
-        });
-      }
+  return any_of(surface.triangles.size(), [&](std::size_t t) {
+    bool found = false;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::int32_t from = surface.triangles[t][k], to = surface.triangles[t][(k + 1) % 3];
+      if (from > to && surface.neighbours[3 * t + k] >= 0) continue;  // the neighbour looks at it
+      crossings.for_each_near(at(from), at(to), [&](std::int32_t other) {
+        const Triangle& v = surface.triangles[static_cast<std::size_t>(other)];
+        const bool apart = std::ranges::find(v, from) == v.end() && std::ranges::find(v, to) == v.end();
+        found = found || (apart && pierces(at(from), at(to), {at(v[0]), at(v[1]), at(v[2])}));
+      });
+    }
+    return found;
   });
 }
 
@@ -112,31 +128,15 @@ kernels::CrossingsView Crossings::view() const {
   return view;
 }
 
-std::vector<unsigned char> folded_triangles(const ClosedSurface& surface, std::span<const Vector3f> vertices,
-                                            float voxel_size) {
+bool has_folds(const ClosedSurface& surface, std::span<const Vector3f> vertices, float voxel_size) {
   Crossings crossings;
   crossings.build(vertices, surface.triangles);
   kernels::SolidView solid{};
   solid.triangles = surface.triangles.front().data();
   solid.vertices = vertices.front().data();
   solid.crossings = crossings.view();
-  const std::vector<Vector3f> normals = vertex_normals(surface, vertices);
-  std::vector<unsigned char> covered(vertices.size(), 0);
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, vertices.size(), 256), [&](const auto& range) {
-    for (std::size_t v = range.begin(); v != range.end(); ++v) {
-      const Vector3f above = vertices[v] + kernels::kAboveVoxels * voxel_size * normals[v];
-      covered[v] = kernels::winding_number(solid, kernels::Vector3<float>{above.x(), above.y(), above.z()}) != 0;
-    }
-  });
-  std::vector<std::atomic<unsigned char>> found(surface.triangles.size());
-  find_pierced(surface, vertices, crossings, found);
-  std::vector<unsigned char> folded(found.size());
-  for (std::size_t t = 0; t < folded.size(); ++t) {
-    folded[t] = found[t];
-    for (const std::int32_t v : surface.triangles[t]) folded[t] |= covered[static_cast<std::size_t>(v)];
-  }
-  if (std::ranges::find(folded, 1) == folded.end()) folded.clear();
-  return folded;
+  return any_covered(vertices, vertex_normals(surface, vertices), solid, kernels::kAboveVoxels * voxel_size) ||
+         any_pierced(surface, vertices, crossings);
 }
 
 }  // namespace ringlet::solids

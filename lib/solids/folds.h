@@ -29,10 +29,7 @@ class Crossings {
   std::vector<std::int32_t> start_, triangle_;
 };
 
-// [triangles] 1 for those with a corner inside another part of the surface or that another's edge pierces; empty
-// where there is none.
-std::vector<unsigned char> folded_triangles(const ClosedSurface& surface,
-                                            std::span<const Eigen::Vector3f> vertices,
-                                            float voxel_size);
+// Whether the surface has any: a vertex inside another part of it, or a triangle that another's edge pierces.
+bool has_folds(const ClosedSurface& surface, std::span<const Eigen::Vector3f> vertices, float voxel_size);
 
 }  // namespace ringlet::solids

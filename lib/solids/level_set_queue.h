@@ -15,9 +15,9 @@ namespace ringlet::solids {
 // A deforming solid's surface at a frame.
 struct FrameSurface {
   std::shared_ptr<const LevelSet> level_set;
-  std::shared_ptr<const std::vector<unsigned char>> folded;  // folded_triangles; null: none
+  bool folded = false;  // has_folds
 
-  std::size_t bytes() const { return level_set->bytes() + (folded ? folded->size() : 0); }
+  std::size_t bytes() const { return level_set->bytes(); }
 };
 
 class LevelSetQueue {

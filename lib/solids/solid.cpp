@@ -100,19 +100,15 @@ struct Solid::Impl {
   }
 
   FrameSurface surface_of(const Vertices& now) const {
-    std::vector<unsigned char> folds = folded_triangles(surface, now, options.voxel_size);
-    return {cached_level_set(surface, now, options),
-            folds.empty() ? nullptr : std::make_shared<const std::vector<unsigned char>>(std::move(folds))};
+    return {cached_level_set(surface, now, options), has_folds(surface, now, options.voxel_size)};
   }
 
-  void find_folds() {
-    folded.clear();
-    for (const auto& of_frame : {pair.before.folded, pair.after.folded}) {
-      if (!of_frame) continue;
-      folded.resize(of_frame->size(), 0);
-      for (std::size_t t = 0; t < folded.size(); ++t) folded[t] |= (*of_frame)[t];
-    }
-    view.folded = folded.empty() ? nullptr : folded.data();
+  // For the vertices now, where the surface has folds at either frame.
+  void find_crossings() {
+    view.crossings = {};
+    if (!pair.before.folded && !pair.after.folded) return;
+    crossings.build(vertices, surface.triangles);
+    view.crossings = crossings.view();
   }
 
   // ---- Still and rigid --------------------------------------------------------------------------
@@ -126,8 +122,7 @@ struct Solid::Impl {
                          1e-6 * pair.before.bytes(),
                          timer.seconds()));
     warn_if_empty(*pair.before.level_set);
-    find_folds();
-    if (!folded.empty()) crossings.build(vertices, surface.triangles), view.crossings = crossings.view();
+    find_crossings();
     show(pair, 0);
     view.vertices_before = view.vertices = vertices.front().data();
   }
@@ -156,14 +151,14 @@ struct Solid::Impl {
 
   void place_deforming(double time_before, double time) {
     const int now = frame_of(time_before);
-    if (!frame || *frame != now) pair = queue->at(now), find_folds();
+    if (!frame || *frame != now) pair = queue->at(now);
     frame = now;
     show(pair, std::clamp(time * fps - now, 0.0, 1.0));
     if (!vertices_time || *vertices_time != time_before) vertices = local_at(time_before);
     vertices_before.swap(vertices);
     vertices = local_at(time);
     vertices_time = time;
-    if (!folded.empty()) crossings.build(vertices, surface.triangles), view.crossings = crossings.view();
+    find_crossings();
     view.vertices_before = vertices_before.front().data();
     view.vertices = vertices.front().data();
     set_placement(view.rotation_before, view.translation_before, Mat3::Identity(), origin);
@@ -178,7 +173,7 @@ struct Solid::Impl {
 
   std::size_t bytes() const {
     return (vertices.size() + vertices_before.size()) * sizeof(Eigen::Vector3f) +
-           surface.triangles.size() * sizeof(Triangle) + crossings.bytes() + folded.size() +
+           surface.triangles.size() * sizeof(Triangle) + crossings.bytes() +
            (queue ? queue->bytes() : pair.before.bytes());
   }
 
@@ -190,8 +185,7 @@ struct Solid::Impl {
   LevelSetOptions options;
   kernels::SolidView view{};
   LevelSetQueue::Pair pair;
-  std::vector<unsigned char> folded;  // in either of `pair`; empty: none
-  Crossings crossings;                // where `folded` is not empty
+  Crossings crossings;
   Vertices vertices, vertices_before;  // at the substep's end and start
 
   std::optional<int> frame;             // whose level sets `pair` holds (deforming)

@@ -18,13 +18,21 @@ constexpr double kClearance = 2e-5;
 // longer than the rounding of contacts.
 constexpr double kShortest = 4e-4;
 
+// The solid as a strand that grows on one of its triangles meets it.
 struct Surface {
   const kernels::SolidView& solid;
+  kernels::Patch skin;
 
-  kernels::SurfaceSample<double> at(const Vec3& x) const {
+  Surface(const kernels::SolidView& view, std::int32_t triangle, const Vec3& root) : solid(view) {
+    if (triangle >= 0) skin = {triangle, kernels::is_covered(solid, triangle, local(root))};
+  }
+
+  kernels::Vector3<double> local(const Vec3& x) const {
     const Vec3 away = x - Vec3(solid.translation[0], solid.translation[1], solid.translation[2]);
-    return kernels::sample_surface(
-        solid, kernels::rotate_back(solid.rotation, kernels::Vector3<double>{away.x(), away.y(), away.z()}));
+    return kernels::rotate_back(solid.rotation, kernels::Vector3<double>{away.x(), away.y(), away.z()});
+  }
+  kernels::SurfaceSample<double> at(const Vec3& x) const {
+    return kernels::sample_surface(solid, local(x), skin);
   }
   Vec3 normal(const kernels::SurfaceSample<double>& sample) const {
     const kernels::Vector3<double> n = kernels::rotate(solid.rotation, sample.normal);
@@ -94,16 +102,16 @@ StrandReport inspect(const Surface& surface, std::span<const Vec3> points) {
 
 PenetrationReport resolve_penetration(scene::Penetration policy, const kernels::SolidView& solid,
                                       std::span<const std::int64_t> offsets, std::span<Vec3> points,
-                                      std::span<unsigned char> ignores, std::span<unsigned char> prune) {
-  const Surface surface{solid};
+                                      std::span<std::int32_t> skin, std::span<unsigned char> prune) {
   const std::size_t strands = offsets.size() - 1;
   std::vector<StrandReport> reports(strands);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, strands, 64), [&](const auto& range) {
     for (std::size_t s = range.begin(); s < range.end(); ++s) {
       const std::span<Vec3> strand = points.subspan(offsets[s], offsets[s + 1] - offsets[s]);
+      const Surface surface(solid, skin[s], strand[0]);
       reports[s] = inspect(surface, strand);
       if (reports[s].buried || reports[s].too_short) {
-        ignores[s] = 1;
+        skin[s] = kernels::kIgnoresHome;
       } else if (policy == scene::Penetration::kPushOut) {
         push_out_strand(surface, strand);
       } else if (policy == scene::Penetration::kPrune && reports[s].inside > 0) {

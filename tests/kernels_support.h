@@ -150,17 +150,21 @@ class StrandRun {
   // The contact stage after a step; lengths as `parameters` says.
   void collide(const std::vector<kernels::SolidView>& solids, int at_a_time = 0) {
     const int batches = model.layout.batches(), piece = at_a_time > 0 ? at_a_time : batches;
-    const state::AlignedVector<std::int32_t> none(batches * kernels::kLanes, kernels::kNoSkin);
+    state::AlignedVector<std::int32_t> grown_on(batches * kernels::kLanes, kernels::kNoSkin);
+    for (std::size_t strand = 0; strand < skin.size(); ++strand)
+      grown_on[model.layout.at_strand(strand, 1, 0)] = skin[strand];
     contact_figures.assign(static_cast<std::size_t>(batches) * kernels::kContactFigures * kernels::kLanes,
                            T(0));
     kernels::ContactStep<T> step{};
     step.batches = model.view(), step.state = state.view(), step.root_points = state.root_points.data();
-    step.skin = none.data(), step.home = -1, step.solids = solids.data();
+    step.skin = grown_on.data(), step.home = home, step.solids = solids.data();
     step.solid_count = static_cast<std::int32_t>(solids.size());
     step.step = parameters.step, step.clamped = parameters.clamped, step.rounds = 8;
     step.length_iterations = parameters.length_iterations,
     step.length_tolerance = parameters.length_tolerance;
     step.figures = contact_figures.data();
+    step.strain_limit = parameters.strain_limit, step.speed_limit = parameters.speed_limit;
+    step.skipped_substeps = parameters.skipped_substeps;
     for (int begin = 0; begin < batches; begin += piece)
       Machine::kernels().contact_step(step, begin, std::min(begin + piece, batches), scratch.data());
   }
@@ -175,6 +179,8 @@ class StrandRun {
   state::StrandModel<T> model;
   state::StrandState<T> state;
   kernels::StrandParameters<T> parameters{};
+  std::int32_t home = -1;          // the solid that strands grow on, as ContactStep has it
+  std::vector<std::int32_t> skin;  // [strands], or empty
   state::AlignedVector<T> figures, contact_figures, scratch;
 
  private:

@@ -130,7 +130,8 @@ struct Band {
   void add_tile(const oracle::MeshDistance& mesh, Eigen::Vector3i at) {
     const Eigen::Vector3d centre = voxel * (8.0 * at.cast<double>() + Eigen::Vector3d::Constant(3.5));
     if (mesh.closest(centre).distance > background + 4 * std::sqrt(3.0) * voxel) {
-      tile.push_back(mesh.inside(centre) ? kernels::kTileInside : kernels::kTileOutside);
+      tile.push_back(mesh.inside(centre) ? kernels::kTileInside - mesh.closest(centre).triangle
+                                         : kernels::kTileOutside);
       return;
     }
     tile.push_back(static_cast<std::int32_t>(distance.size() / 512));
@@ -138,8 +139,9 @@ struct Band {
       const Eigen::Vector3d p = voxel * (8 * at + Eigen::Vector3i(v >> 6, v >> 3 & 7, v & 7)).cast<double>();
       const auto closest = mesh.closest(p);
       const float away = std::min(static_cast<float>(closest.distance), background);
-      distance.push_back(mesh.inside(p) ? -away : away);
-      triangle.push_back(closest.distance < background ? closest.triangle : -1);
+      const bool inside = mesh.inside(p);
+      distance.push_back(inside ? -away : away);
+      triangle.push_back(inside || closest.distance < background ? closest.triangle : -1);
     }
   }
 };

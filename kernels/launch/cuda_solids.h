@@ -41,14 +41,14 @@ class CudaSolid {
     if (stale || moving || moved || host.vertices != last_.vertices)
       vertices_.upload({host.vertices, 3 * vertex_count_}, stream);
     if (moving) vertices_before_.upload({host.vertices_before, 3 * vertex_count_}, stream);
-    if (host.crossings.start != nullptr && (stale || moving || moved)) upload_crossings(host.crossings, stream);
+    if (host.crossings.start != nullptr && (stale || moving || moved))
+      upload_crossings(host.crossings, stream);
     last_ = host, interval_ = interval;
     return view(host);
   }
   std::size_t bytes() const {
     return level_set_[0].bytes() + level_set_[1].bytes() + triangles_.bytes() + neighbours_.bytes() +
-           vertices_.bytes() + vertices_before_.bytes() + bin_start_.bytes() +
-           bin_triangle_.bytes();
+           vertices_.bytes() + vertices_before_.bytes() + bin_start_.bytes() + bin_triangle_.bytes();
   }
 
  private:

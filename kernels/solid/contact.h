@@ -3,9 +3,9 @@
 //
 // A particle found inside at x + h v first loses the part of its velocity that goes into the solid, with
 // Coulomb friction:    v' = v_solid + max(0, 1 - mu |u_n| / |u_t|) u_t,   u = v - v_solid and moves to x + h
-// v'; if that is still inside it is pushed out along the normal (the paper's sign pushes deeper). One that has
-// passed through the solid, or to the far side of a thin one, is taken back to where it entered and slides on
-// from there.
+// v'; if that is still inside it is pushed out along the normal (the paper's sign pushes deeper). One that
+// has passed through the solid, or to the far side of a thin one, is taken back to where it entered and
+// slides on from there.
 #pragma once
 #include "kernels/solid/surface.h"
 #include "kernels/strand/strand_batch.h"
@@ -85,13 +85,14 @@ struct StrandContact {
     return fma(keep, tangential, solid_velocity);
   }
 
-  // The particle's way over the substep as the solid sees it, level-set axes [m]. A surface that deforms takes
-  // along what is near it.
+  // The particle's way over the substep as the solid sees it, level-set axes [m]. A surface that deforms
+  // takes along what is near it.
   RINGLET_FUNCTION Vector3<T> way(Vector3<T> x, Vector3<T> v, Vector3<T> p, std::int32_t nearest) const {
     const Vector3<T> before = root_before + rotate_back(solid.rotation_before, fma(T(0) - step, v, x));
     const std::int32_t carrier = nearest >= 0 ? nearest : skin.triangle;
     if (solid.vertices == solid.vertices_before || carrier < 0) return p - before;
-    return p - before - local_displacement(solid, carrier, closest_on_triangle(solid, carrier, p).barycentric);
+    return p - before -
+           local_displacement(solid, carrier, closest_on_triangle(solid, carrier, p).barycentric);
   }
 };
 
@@ -106,7 +107,8 @@ struct Entry {
 // Looks along the last `way` to p for the solid. Steps as long as the distances allow find what is half a
 // voxel thick or more.
 template <class T>
-RINGLET_FUNCTION Entry<T> find_entry(const StrandContact<T>& contact, Vector3<T> p, Vector3<T> way, T distance) {
+RINGLET_FUNCTION Entry<T> find_entry(const StrandContact<T>& contact, Vector3<T> p, Vector3<T> way,
+                                     T distance) {
   constexpr int kMostProbes = 256, kHalvings = 6;
   const T least = max(T(0.5) * contact.voxel, distance / T(kMostProbes));
   const auto depth_after = [&](T gone) {
@@ -127,8 +129,8 @@ RINGLET_FUNCTION Entry<T> find_entry(const StrandContact<T>& contact, Vector3<T>
   return {true, contact.world(fma(inside / distance - T(1), way, p)), T(1) - inside / distance};
 }
 
-// An entry that the sample at the particle's end does not show: it has passed through, or is nearer to the far
-// side.
+// An entry that the sample at the particle's end does not show: it has passed through, or is nearer to the
+// far side.
 template <class T>
 RINGLET_FUNCTION Entry<T> hidden_entry(const StrandContact<T>& contact, Vector3<T> x, Vector3<T> v,
                                        const SurfaceSample<T>& at, LaneFigures<T>& figures) {

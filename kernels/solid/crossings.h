@@ -16,7 +16,8 @@ RINGLET_FUNCTION T crossing_side(Vector3<T> a, Vector3<T> b) {
   return left - right;
 }
 
-// 1 where the ray from the origin along +x leaves through the triangle, -1 where it enters, 0 where it misses.
+// 1 where the ray from the origin along +x leaves through the triangle, -1 where it enters, 0 where it
+// misses.
 template <class T>
 RINGLET_FUNCTION int crossing(Vector3<T> a, Vector3<T> b, Vector3<T> c, const std::int32_t* vertex) {
   const auto positive = [](T side, std::int32_t from, std::int32_t to) {

@@ -20,7 +20,7 @@ RINGLET_FUNCTION std::int32_t tile_at(const LevelSetView& set, int x, int y, int
   return set.tile[(i * set.tile_count[1] + j) * set.tile_count[2] + k];
 }
 
-// Where a voxel's values are, -1 where its tile is outside, -2 where it is inside.
+// Where a voxel's values are; where it has none, its tile's number.
 RINGLET_FUNCTION std::int64_t voxel_at(const LevelSetView& set, int x, int y, int z) {
   const std::int32_t tile = tile_at(set, x >> 3, y >> 3, z >> 3);
   return tile < 0 ? tile : static_cast<std::int64_t>(tile) * 512 + ((x & 7) << 6 | (y & 7) << 3 | (z & 7));
@@ -28,9 +28,10 @@ RINGLET_FUNCTION std::int64_t voxel_at(const LevelSetView& set, int x, int y, in
 
 template <class T>
 struct LevelSetSample {
-  T distance;             // [m], plus or minus the background beyond the band
-  std::int32_t triangle;  // closest to the voxel nearest to the point; -1 where unknown
-  bool enclosed;          // no voxel about the point is outside
+  T distance;  // [m], plus or minus the background beyond the band
+  std::int32_t
+      triangle;   // closest to the voxel nearest to the point, deep inside one near by; -1 where unknown
+  bool enclosed;  // no voxel about the point is outside
 };
 
 // A value beyond this many voxels needs no interpolation: the surface is not in the cell.
@@ -45,7 +46,10 @@ RINGLET_FUNCTION LevelSetSample<T> sample_level_set(const LevelSetView& set, Vec
   const Vector3<T> q = {index(p.x), index(p.y), index(p.z)};
   const auto nearest = [](T a) { return floor_to_int(a + T(0.5)); };
   const std::int64_t centre = voxel_at(set, nearest(q.x), nearest(q.y), nearest(q.z));
-  if (centre < 0) return {centre == kTileInside ? T(0) - background : background, -1, centre == kTileInside};
+  if (centre < 0) {
+    if (centre == kTileOutside) return {background, -1, false};
+    return {T(0) - background, static_cast<std::int32_t>(kTileInside - centre), true};
+  }
   const T value = static_cast<T>(set.distance[centre]);
   const std::int32_t triangle = set.triangle[centre];
   if (abs(value) > static_cast<T>(kFarVoxels * set.voxel_size)) return {value, triangle, value < T(0)};
@@ -55,9 +59,9 @@ RINGLET_FUNCTION LevelSetSample<T> sample_level_set(const LevelSetView& set, Vec
   bool enclosed = true;
   const auto at = [&](int corner) {
     const std::int64_t voxel = voxel_at(set, x + (corner >> 2), y + (corner >> 1 & 1), z + (corner & 1));
-    const T found = voxel >= 0             ? static_cast<T>(set.distance[voxel])
-                    : voxel == kTileInside ? T(0) - background
-                                           : background;
+    const T found = voxel >= 0              ? static_cast<T>(set.distance[voxel])
+                    : voxel == kTileOutside ? background
+                                            : T(0) - background;
     enclosed = enclosed && found < T(0);
     return found;
   };

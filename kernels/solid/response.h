@@ -147,14 +147,16 @@ struct ContactLane {
   }
 
   // Where particles that came to lie on several sheets of the home solid hold the lengths apart, as in a fold
-  // of skin: those inside go to the one sheet that the strand grows on, followed from the root along the strand.
+  // of skin: those inside go to the one sheet that the strand grows on, followed from the root along the
+  // strand.
   RINGLET_FUNCTION void push_to_own_sheet(LaneFigures<T>& figures) const {
     figures.pushed = T(0);
     for_each_solid([&](StrandContact<T> contact) {
       for (int i = first(); i < count; ++i) {
         SurfaceSample<T> at = contact.sample(position(i));
         if (contact.skin.triangle >= 0) {
-          const SurfaceSample<T> own = sample_sheet(contact.solid, contact.local(position(i)), contact.skin.triangle);
+          const SurfaceSample<T> own =
+              sample_sheet(contact.solid, contact.local(position(i)), contact.skin.triangle);
           contact.skin.triangle = own.triangle;
           if (at.distance < T(0)) at = own;
         }
@@ -193,7 +195,8 @@ struct ContactLane {
         const T share = T(1) / fma(T(1) - t, T(1) - t, t * t);
         a = fma((T(1) - t) * share * depth, n, a), b = fma(t * share * depth, n, b);
         // The sample's velocity responds as a particle's: left alone it would come back faster every time.
-        const Vector3<T> va = pack.get(pack.velocity, i, in_pack), vb = pack.get(pack.velocity, i + 1, in_pack);
+        const Vector3<T> va = pack.get(pack.velocity, i, in_pack),
+                         vb = pack.get(pack.velocity, i + 1, in_pack);
         const Vector3<T> v = fma(t, vb - va, va), changed = contact.respond(at, n, v) - v;
         pack.set(pack.velocity, i, in_pack, fma((T(1) - t) * share, changed, va));
         pack.set(pack.velocity, i + 1, in_pack, fma(t * share, changed, vb));
@@ -225,8 +228,8 @@ struct PackContacts {
 
   // `first_lane` is the pack's first lane in the batch, `scratch` holds kContactReals values a particle,
   // `stride` apart.
-  RINGLET_FUNCTION PackContacts(const ContactStep<T>& contact_step, int batch_number, int first_lane, T* scratch,
-                                int stride)
+  RINGLET_FUNCTION PackContacts(const ContactStep<T>& contact_step, int batch_number, int first_lane,
+                                T* scratch, int stride)
       : step(contact_step),
         batch(batch_number),
         lane(first_lane),
@@ -258,7 +261,8 @@ struct PackContacts {
     return static_cast<std::int64_t>(step.batches.row[batch]) * 3 * kLanes + lane;
   }
   RINGLET_FUNCTION ContactLane<R> strand(int l) const {
-    return {step, pack, batch, lane + l, l, static_cast<int>(step.batches.count[batch * kLanes + lane + l]),
+    return {step,     pack, batch,
+            lane + l, l,    static_cast<int>(step.batches.count[batch * kLanes + lane + l]),
             skins[l]};
   }
 
@@ -300,8 +304,8 @@ struct PackContacts {
       if (open[l] > T(0)) figures[l].strain = left[l];
   }
 
-  // Strands whose lengths cannot hold where contacts have put them try again on their own sheet, and keep what
-  // strains less.
+  // Strands whose lengths cannot hold where contacts have put them try again on their own sheet, and keep
+  // what strains less.
   RINGLET_FUNCTION void settle_stuck() {
     const T limit = static_cast<T>(kStuckTolerances) * step.length_tolerance;
     LaneFigures<T> before[kWidth];
@@ -312,8 +316,7 @@ struct PackContacts {
       stuck = stuck || open[l] > T(0);
     }
     if (!stuck) return;
-    for (int i = 0; i < particles; ++i)
-      store3<R>(pack.normal + 3 * i * pack.stride, pack.stride, zero3<R>());
+    for (int i = 0; i < particles; ++i) store3<R>(pack.normal + 3 * i * pack.stride, pack.stride, zero3<R>());
     alignas(64) T better[kWidth];
     for (int l = 0; l < kWidth; ++l) better[l] = open[l];
     settle(true);

@@ -13,16 +13,16 @@ struct LevelSetView {
   float background;          // [m] half width of the band: the distance stored beyond it
   std::int32_t tile_min[3];  // lowest tile coordinate, in tiles
   std::int32_t tile_count[3];
-  const std::int32_t* tile;      // [x][y][z]: tile number, or kTileOutside / kTileInside
-  const float* distance;         // [tiles][512], voxel (x & 7) << 6 | (y & 7) << 3 | (z & 7)
-  const std::int32_t* triangle;  // [tiles][512] closest triangle, -1 where unknown
+  const std::int32_t* tile;  // [x][y][z]: tile number, kTileOutside, or kTileInside less a triangle near by
+  const float* distance;     // [tiles][512], voxel (x & 7) << 6 | (y & 7) << 3 | (z & 7)
+  const std::int32_t* triangle;  // [tiles][512] closest triangle; beyond the band one near by, -1 outside
 };
 inline constexpr std::int32_t kTileOutside = -1;
 inline constexpr std::int32_t kTileInside = -2;
 
 // The triangles that a ray along +x may cross, binned by where it starts in the yz plane.
 struct CrossingsView {
-  float low[2];   // [m] y and z of the first bin's corner
+  float low[2];     // [m] y and z of the first bin's corner
   float per_metre;  // bins
   std::int32_t count[2];
   const std::int32_t* start;     // [bins + 1] into `triangle`

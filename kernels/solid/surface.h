@@ -120,9 +120,9 @@ RINGLET_FUNCTION Side<T> side_of(const SolidView& solid, const ClosestPoint<T>& 
 }
 
 // How near the level set must say the surface is for the exact mesh to be asked, in voxels. Its samples are
-// exact; where the surface lies between a point and a corner of its cell, that corner's distance is no more than
-// the corner is away, and the trilinear mean of these ways is at most half a cell's diagonal. Beyond it the level
-// set knows the side, however thin the solid.
+// exact; where the surface lies between a point and a corner of its cell, that corner's distance is no more
+// than the corner is away, and the trilinear mean of these ways is at most half a cell's diagonal. Beyond it
+// the level set knows the side, however thin the solid.
 inline constexpr float kNearVoxels = 0.867f;
 
 // By how much the exact distance may differ from the level set's before it is doubted, in voxels.
@@ -147,8 +147,8 @@ struct BlendedSample {
   }
 };
 
-// Where a strand grows on the solid: the level set's time-blended guess can miss that place, and does not know
-// it where another part of the solid covers it, in a fold of skin or behind a limb.
+// Where a strand grows on the solid: the level set's time-blended guess can miss that place, and does not
+// know it where another part of the solid covers it, in a fold of skin or behind a limb.
 struct Patch {
   std::int32_t triangle = -1;
   bool covered = false;
@@ -184,10 +184,6 @@ RINGLET_OUTLINED SurfaceSample<T> sample_surface(const SolidView& solid, Vector3
   consider(solid, first.triangle, p, best);
   consider(solid, second.triangle, p, best);
   consider(solid, skin.triangle, p, best);
-  if (best.triangle < 0) {  // past the band, deep inside: ask every triangle
-    for (std::int32_t triangle = 0; triangle < solid.triangle_count; ++triangle)
-      consider(solid, triangle, p, best);
-  }
   if (best.triangle < 0) return sample;
   walk(solid, p, best);
   // The walk can end where another part of the surface is closer still. Then it disagrees with the level set:
@@ -229,16 +225,16 @@ RINGLET_FUNCTION SurfaceSample<T> sample_surface(const SolidView& solid, Vector3
   return sample_surface(solid, p, skin, static_cast<T>(kNearVoxels * solid.level_set[0].voxel_size));
 }
 
-// The sheet of the surface that a walk from `triangle` leads to, for a point behind it or behind another sheet:
-// it lies inside, whichever side of this sheet it is on.
+// The sheet of the surface that a walk from `triangle` leads to, for a point behind it or behind another
+// sheet: it lies inside, whichever side of this sheet it is on.
 template <class T>
 RINGLET_FUNCTION SurfaceSample<T> sample_sheet(const SolidView& solid, Vector3<T> p, std::int32_t triangle) {
   ClosestPoint<T> own = closest_on_triangle(solid, triangle, p);
   walk(solid, p, own);
   const T away = sqrt(own.distance2);
   const Vector3<T> towards = away < T(1e-7) ? outward(solid, own) : T(-1) * own.to_point;
-  return {T(0) - away, true,
-          inverse_or_zero(length(towards), shortest_direction<T>()) * towards, own.triangle, own.barycentric};
+  return {T(0) - away, true, inverse_or_zero(length(towards), shortest_direction<T>()) * towards,
+          own.triangle, own.barycentric};
 }
 
 // World from level-set axes and back.
@@ -256,8 +252,8 @@ RINGLET_FUNCTION Vector3<T> rotate_back(const double* rotation, Vector3<T> a) {
 }
 
 template <class T>
-RINGLET_FUNCTION Vector3<T> surface_point(const SolidView& solid, const float* vertices, std::int32_t triangle,
-                                          Vector3<T> barycentric) {
+RINGLET_FUNCTION Vector3<T> surface_point(const SolidView& solid, const float* vertices,
+                                          std::int32_t triangle, Vector3<T> barycentric) {
   const std::int32_t* v = solid.triangles + 3 * static_cast<std::int64_t>(triangle);
   return barycentric.x * corner<T>(vertices, v[0]) + barycentric.y * corner<T>(vertices, v[1]) +
          barycentric.z * corner<T>(vertices, v[2]);

@@ -46,8 +46,8 @@ RINGLET_KERNEL Vector3<R> mobility(const ProjectedStrand<R>& s, int particle, Ve
   return fma((contact_slip<R>() - R(1)) * dot(n, a), n, a);
 }
 
-// Segments shorter than this [m], a fiftieth of a hair's width, are left to the springs: they have no direction
-// to speak of.
+// Segments shorter than this [m], a fiftieth of a hair's width, are left to the springs: they have no
+// direction to speak of.
 template <class R>
 RINGLET_KERNEL R shortest_held() {
   return R(Scalar<R>(1e-6));

@@ -129,20 +129,11 @@ void check_distances(const std::vector<ClosestPoint>& sites, const scene::Groom&
           sites.size()),
       "check the units and up axis of groom and head, or raise attach_distance");
 }
-// Moves whole strands, their shapes as they are.
-void snap_roots(Strands& strands, const std::vector<ClosestPoint>& sites) {
-  for (std::size_t s = 0; s < strands.size(); ++s) {
-    const Vec3 shift = sites[s].point - strands.points[strands.offsets[s]];
-    for (auto i = strands.offsets[s]; i < strands.offsets[s + 1]; ++i) strands.points[i] += shift;
-  }
-}
-
 }  // namespace
 
-Attachment Attachment::to_head(Strands& strands, const Scalp& rest, const scene::Groom& desc) {
+Attachment Attachment::to_head(const Strands& strands, const Scalp& rest, const scene::Groom& desc) {
   const std::vector<ClosestPoint> sites = find_sites(strands, rest, desc);
   check_distances(sites, desc);
-  if (desc.root_offset == scene::RootOffset::kSnap) snap_roots(strands, sites);
   Attachment attachment;
   for (std::size_t strand = 0; strand < sites.size(); ++strand) {
     const Triangle& triangle = rest.triangles[sites[strand].triangle];
@@ -150,9 +141,19 @@ Attachment Attachment::to_head(Strands& strands, const Scalp& rest, const scene:
     attachment.triangles_.push_back(triangle);
     attachment.rest_frame_.push_back(triangle_frame(rest.vertices, triangle, Mat3::Identity()));
     attachment.rest_point_.push_back(point_at(rest.vertices, triangle, sites[strand].barycentric));
-    attachment.rest_root_.push_back(strands.points[strands.offsets[strand]]);
+    attachment.rest_root_.push_back(desc.root_offset == scene::RootOffset::kSnap
+                                        ? attachment.rest_point_.back()
+                                        : strands.points[strands.offsets[strand]]);
   }
   return attachment;
+}
+
+void Attachment::place(Strands& strands) const {
+  for (std::size_t s = 0; s < strands.size(); ++s) {
+    const Vec3 shift = rest_root_[s] - strands.points[strands.offsets[s]];
+    for (auto i = strands.offsets[s]; i < strands.offsets[s + 1]; ++i) strands.points[i] += shift;
+    strands.points[strands.offsets[s]] = rest_root_[s];
+  }
 }
 
 void Attachment::pose(std::span<const Vec3> vertices, std::span<Pose> out) const {

@@ -38,8 +38,12 @@ class Attachment {
   // Stored coordinates that do not lie at the root give way to the stored triangle's nearest point. Throws
   // Error{kInput} naming strand and distance where a root is farther than `desc.attach_distance` from the
   // head, or a stored triangle does not exist.
-  // `desc.root_offset` snap moves the strands so that their roots lie on the head.
-  static Attachment to_head(Strands& strands, const Scalp& rest, const scene::Groom& desc);
+  // With `desc.root_offset` snap the roots are held on the head itself: place() moves the strands there.
+  static Attachment to_head(const Strands& strands, const Scalp& rest, const scene::Groom& desc);
+
+  // Moves whole strands, their shapes as they are, so that their roots are where they are held in the rest
+  // pose.
+  void place(Strands& strands) const;
 
   const std::vector<RootSite>& sites() const { return sites_; }
 

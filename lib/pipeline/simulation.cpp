@@ -102,8 +102,7 @@ class TypedSimulation : public Simulation {
         now_(world_.strands.size()) {
     stages_.push_back(effects::make_strand_stage<T>(scene_, model_, state_));
     if (!world_.solids.empty())
-      stages_.push_back(
-          effects::make_contact_stage<T>(scene_, world_.solids, world_.skin, model_, state_));
+      stages_.push_back(effects::make_contact_stage<T>(scene_, world_.solids, world_.skin, model_, state_));
     make_plan();
   }
 

@@ -29,9 +29,9 @@ void build_solids(const scene::Scene& scene, World& world) {
       mesh = &world.solid_meshes.emplace_back(*desc.mesh, scene.units, scene.frames);
       world.shown.push_back(mesh), world.shown_names.push_back(desc.name);
     }
-    if (desc.proxy)
-      mesh = &world.solid_meshes.emplace_back(*desc.proxy, scene.units, scene.frames);
-    if (desc.is_head) world.skin.home = static_cast<std::int32_t>(world.solids.size()), world.home_mesh = mesh;
+    if (desc.proxy) mesh = &world.solid_meshes.emplace_back(*desc.proxy, scene.units, scene.frames);
+    if (desc.is_head)
+      world.skin.home = static_cast<std::int32_t>(world.solids.size()), world.home_mesh = mesh;
     world.solids.emplace_back(desc, *mesh, scene.frames, first_time(scene.frames),
                               desc.level_set_cache.value_or(std::filesystem::path{}));
   }
@@ -76,11 +76,14 @@ groom::Strands without(const groom::Strands& strands, const std::vector<unsigned
 std::optional<groom::Attachment> attach(const World& world, const scene::Groom& desc,
                                         groom::Strands& strands) {
   if (desc.attach == scene::Attach::kFixed) return std::nullopt;
-  return groom::Attachment::to_head(strands, scalp_of(*world.head), desc);
+  std::optional<groom::Attachment> attachment =
+      groom::Attachment::to_head(strands, scalp_of(*world.head), desc);
+  attachment->place(strands);
+  return attachment;
 }
 
-// The triangles of the home solid that strands grow on. Its surface begins with the head's triangles; on a proxy
-// it is the one nearest in the rest pose.
+// The triangles of the home solid that strands grow on. Its surface begins with the head's triangles; on a
+// proxy it is the one nearest in the rest pose.
 std::vector<std::int32_t> find_skin(const scene::Scene& scene, const World& world,
                                     const groom::Attachment* attachment, const groom::Strands& strands) {
   std::vector<std::int32_t> skin(strands.size(), kernels::kNoSkin);
@@ -89,7 +92,8 @@ std::vector<std::int32_t> find_skin(const scene::Scene& scene, const World& worl
   if (scene.effects.solids[static_cast<std::size_t>(world.skin.home)].proxy)
     proxy.emplace(world.home_mesh->rest_vertices(), world.home_mesh->triangles());
   for (std::size_t s = 0; s < skin.size(); ++s)
-    skin[s] = proxy ? proxy->find(strands.points[strands.offsets[s]]).triangle : attachment->sites()[s].triangle;
+    skin[s] =
+        proxy ? proxy->find(strands.points[strands.offsets[s]]).triangle : attachment->sites()[s].triangle;
   return skin;
 }
 

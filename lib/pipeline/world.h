@@ -26,7 +26,7 @@ struct World {
   std::vector<float> stiffness;  // [particles * kCouplings] where a groom scales it, else empty
   std::unique_ptr<Roots> roots;
   const solids::AnimatedMesh* home_mesh = nullptr;  // what collides as the head
-  effects::Skin skin;  // what they grow on among the solids
+  effects::Skin skin;                               // what they grow on among the solids
 };
 
 // Reads and builds all assets. Throws Error{kInput}.

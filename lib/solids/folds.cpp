@@ -18,7 +18,8 @@ using Vector3f = Eigen::Vector3f;
 std::vector<Vector3f> vertex_normals(const ClosedSurface& surface, std::span<const Vector3f> vertices) {
   std::vector<Vector3f> normals(vertices.size(), Vector3f::Zero());
   for (const Triangle& t : surface.triangles) {
-    const Vector3f &a = vertices[static_cast<std::size_t>(t[0])], &b = vertices[static_cast<std::size_t>(t[1])],
+    const Vector3f &a = vertices[static_cast<std::size_t>(t[0])],
+                   &b = vertices[static_cast<std::size_t>(t[1])],
                    &c = vertices[static_cast<std::size_t>(t[2])];
     const Vector3f area = (b - a).cross(c - a);
     for (const std::int32_t v : t) normals[static_cast<std::size_t>(v)] += area;
@@ -55,7 +56,8 @@ bool any_covered(std::span<const Vector3f> vertices, std::span<const Vector3f> n
   });
 }
 
-bool any_pierced(const ClosedSurface& surface, std::span<const Vector3f> vertices, const Crossings& crossings) {
+bool any_pierced(const ClosedSurface& surface, std::span<const Vector3f> vertices,
+                 const Crossings& crossings) {
   const auto at = [&](std::int32_t v) -> const Vector3f& { return vertices[static_cast<std::size_t>(v)]; };
   return any_of(surface.triangles.size(), [&](std::size_t t) {
     bool found = false;
@@ -79,8 +81,9 @@ void Crossings::build(std::span<const Vector3f> vertices, std::span<const Triang
   for (const Vector3f& v : vertices) box.extend(v.tail<2>());
   // About as many bins as triangles: a ray meets few that it does not cross.
   const float area = std::max(box.volume(), 1e-12f);
-  const float edge = std::max(std::sqrt(area / static_cast<float>(std::max<std::size_t>(triangles.size(), 1))),
-                              box.sizes().maxCoeff() / 1024);
+  const float edge =
+      std::max(std::sqrt(area / static_cast<float>(std::max<std::size_t>(triangles.size(), 1))),
+               box.sizes().maxCoeff() / 1024);
   view_.per_metre = 1 / edge;
   for (int axis = 0; axis < 2; ++axis) {
     view_.low[axis] = box.min()[axis];
@@ -97,8 +100,9 @@ void Crossings::build(std::span<const Vector3f> vertices, std::span<const Triang
   triangle_.resize(static_cast<std::size_t>(start_.back()));
   std::vector<std::int32_t> next(start_.begin(), start_.end() - 1);
   for (std::size_t t = 0; t < triangles.size(); ++t)
-    for_each_bin_of(triangles[t],
-                 [&](std::size_t bin) { triangle_[static_cast<std::size_t>(next[bin]++)] = static_cast<std::int32_t>(t); });
+    for_each_bin_of(triangles[t], [&](std::size_t bin) {
+      triangle_[static_cast<std::size_t>(next[bin]++)] = static_cast<std::int32_t>(t);
+    });
 }
 
 template <class Visit>
@@ -135,7 +139,8 @@ bool has_folds(const ClosedSurface& surface, std::span<const Vector3f> vertices,
   solid.triangles = surface.triangles.front().data();
   solid.vertices = vertices.front().data();
   solid.crossings = crossings.view();
-  return any_covered(vertices, vertex_normals(surface, vertices), solid, kernels::kAboveVoxels * voxel_size) ||
+  return any_covered(vertices, vertex_normals(surface, vertices), solid,
+                     kernels::kAboveVoxels * voxel_size) ||
          any_pierced(surface, vertices, crossings);
 }
 

@@ -39,9 +39,9 @@ struct Tile {
   std::array<std::int32_t, kTileVoxels> triangle;
 };
 
-// Tiles sorted by origin, and the dense table over their bounds.
+// Tiles sorted by origin, and the dense table over their bounds. `number` is asked for the others'.
 LevelSet assemble(const std::vector<std::unique_ptr<Tile>>& tiles, float voxel_size, float background,
-                  const std::function<bool(const Coord&)>& is_inside) {
+                  const std::function<std::int32_t(const Coord&)>& number) {
   LevelSet result;
   result.voxel_size = voxel_size;
   result.background = background;
@@ -67,7 +67,7 @@ LevelSet assemble(const std::vector<std::unique_ptr<Tile>>& tiles, float voxel_s
       for (int z = low.z(); z < low.z() + count.z(); ++z) {
         const Coord origin = Coord(x, y, z) << 3;
         if (next == tiles.end() || (*next)->origin != origin) {
-          result.tile.push_back(is_inside(origin) ? kernels::kTileInside : kernels::kTileOutside);
+          result.tile.push_back(number(origin));
           continue;
         }
         result.tile.push_back(static_cast<std::int32_t>(next - tiles.begin()));
@@ -209,6 +209,7 @@ std::unique_ptr<Tile> measure(const Coord& origin, const Surroundings& surface, 
   Eigen::Vector3f asked = position(origin) + Eigen::Vector3f::Constant(3.5f);  // the last point asked about
   ClosestTriangle::Hit hit = surface.nearest(asked, band + kHalfDiagonal);
   if (hit.triangle < 0) return nullptr;
+  std::int32_t near_by = hit.triangle;
   auto tile = std::make_unique<Tile>();
   tile->origin = origin;
   bool is_near = false;
@@ -224,7 +225,8 @@ std::unique_ptr<Tile> measure(const Coord& origin, const Surroundings& surface, 
     const bool is_inside =
         in_band ? surface.is_inside(voxel, distance, hit.triangle) : surface.is_inside(voxel);
     tile->distance[i] = (is_inside ? -1 : 1) * (in_band ? distance * voxel_size : background);
-    tile->triangle[i] = in_band ? hit.triangle : -1;
+    if (hit.triangle >= 0) near_by = hit.triangle;
+    tile->triangle[i] = in_band || is_inside ? near_by : -1;
     is_near = is_near || in_band;
   }
   return is_near ? std::move(tile) : nullptr;
@@ -274,7 +276,14 @@ LevelSet build_level_set(const ClosedSurface& surface, std::span<const Eigen::Ve
       tiles[i] = measure(origins[i], surroundings, voxel_size, half_width);
   });
   std::erase(tiles, nullptr);
-  return assemble(tiles, voxel_size, static_cast<float>(half_width) * voxel_size, interior.query());
+  const auto number = [&, is_inside = interior.query()](const Coord& origin) {
+    if (!is_inside(origin)) return kernels::kTileOutside;
+    constexpr float kAnywhere = 1e30f;
+    const Coord middle = origin.offsetBy(kTileEdge / 2);
+    return kernels::kTileInside -
+           closest.nearest({float(middle.x()), float(middle.y()), float(middle.z())}, kAnywhere).triangle;
+  };
+  return assemble(tiles, voxel_size, static_cast<float>(half_width) * voxel_size, number);
 }
 
 // ---- Files --------------------------------------------------------------------------------------
@@ -309,13 +318,16 @@ openvdb::GridPtrVec to_grids(const LevelSet& level_set) {
   auto triangle = empty_grid<Int32Grid>(kTriangleGrid, -1, level_set.voxel_size);
   distance->setGridClass(openvdb::GRID_LEVEL_SET);
   for_each_tile(level_set, [&](const Coord& origin, std::int32_t tile) {
-    if (tile == kernels::kTileInside) distance->tree().addTile(1, origin, -level_set.background, false);
+    if (tile <= kernels::kTileInside) {
+      distance->tree().addTile(1, origin, -level_set.background, false);
+      triangle->tree().addTile(1, origin, kernels::kTileInside - tile, false);
+    }
     if (tile < 0) return;
     FloatLeaf& distance_leaf = *distance->tree().touchLeaf(origin);
     Int32Leaf& triangle_leaf = *triangle->tree().touchLeaf(origin);
     for (openvdb::Index i = 0; i < kTileVoxels; ++i) {
       const std::size_t voxel = static_cast<std::size_t>(tile) * kTileVoxels + i;
-      const bool in_band = level_set.triangle[voxel] >= 0;
+      const bool in_band = std::abs(level_set.distance[voxel]) < level_set.background;
       distance_leaf.setValueOnly(i, level_set.distance[voxel]);
       triangle_leaf.setValueOnly(i, level_set.triangle[voxel]);
       distance_leaf.setActiveState(i, in_band);
@@ -344,8 +356,14 @@ LevelSet from_grids(const FloatGrid& distance, const Int32Grid& triangle, std::s
   }
   std::sort(tiles.begin(), tiles.end(), [](const auto& a, const auto& b) { return a->origin < b->origin; });
   const auto values = distance.getConstAccessor();
-  return assemble(tiles, static_cast<float>(distance.voxelSize()[0]), distance.background(),
-                  [&values](const Coord& voxel) { return values.getValue(voxel) < 0; });
+  const auto triangles = triangle.getConstAccessor();
+  const auto number = [&](const Coord& origin) {
+    if (values.getValue(origin) >= 0) return kernels::kTileOutside;
+    const std::int32_t near_by = triangles.getValue(origin);
+    if (near_by < 0 || near_by >= static_cast<std::int64_t>(triangle_count)) refuse();
+    return kernels::kTileInside - near_by;
+  };
+  return assemble(tiles, static_cast<float>(distance.voxelSize()[0]), distance.background(), number);
 }
 
 }  // namespace

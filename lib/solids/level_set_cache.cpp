@@ -15,7 +15,7 @@
 namespace ringlet::solids {
 namespace {
 
-constexpr std::uint32_t kFormat = 1;  // raised when level sets of the same surface come out otherwise
+constexpr std::uint32_t kFormat = 2;  // raised when level sets of the same surface come out otherwise
 
 // Two 64-bit multiplicative hashes side by side. Not against malice: a directory of one's own files.
 class Hash {

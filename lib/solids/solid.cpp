@@ -119,8 +119,7 @@ struct Solid::Impl {
     pair.before = pair.after = surface_of(vertices);
     log_info(fmt::format("{}: level set of {} tiles, voxels of {:g} m, {:.1f} MB, {:.2f} s", name,
                          pair.before.level_set->distance.size() / 512, options.voxel_size,
-                         1e-6 * pair.before.bytes(),
-                         timer.seconds()));
+                         1e-6 * pair.before.bytes(), timer.seconds()));
     warn_if_empty(*pair.before.level_set);
     find_crossings();
     show(pair, 0);

@@ -145,7 +145,10 @@ void contact_step(benchmark::State& run, InstructionSet set, bool near) {
                                4,
                                8,
                                T(1e-4),
-                               figures.data()};
+                               figures.data(),
+                               T(10),
+                               T(1000),
+                               0};
   for (auto _ : run)
     kernels::cpu_kernels<T>(set).contact_step(step, 0, bench.model.layout.batches(), bench.scratch.data());
   report(run);

@@ -89,6 +89,45 @@ TYPED_TEST(KernelLengths, KeepTheMomentumOfAFreeStrand) {
   }
 }
 
+// Once a frame of M substeps: the displacement took all of them, v = dx / (M h).
+TYPED_TEST(KernelLengths, CorrectVelocitiesOverAllSubstepsOfTheirCadence) {
+  using T = typename TypeParam::T;
+  std::mt19937 generator(8);
+  const auto [strand, x] = displaced<T>(generator, 12, 1, 0.001);
+  constexpr double kStep = 1.0 / 240;
+  for (const int skipped : {0, 3}) {
+    StrandRun<TypeParam> run({strand}, {RootPose{}}, false);
+    make_forceless(run);
+    run.parameters.length_iterations = 8, run.parameters.length_tolerance = T(1e-4);
+    run.parameters.skipped_substeps = skipped;
+    run.set(0, {x, Points::Zero(3, 12)});
+    run.step({RootPose{}}, kStep);
+    const oracle::State end = run.get(0);
+    EXPECT_GT(end.velocity.norm(), 1e-2);
+    const double off = (end.velocity - (end.position - x) / ((1 + skipped) * kStep)).norm();
+    EXPECT_TRUE(off <= this->either(1e-11, 1e-3)) << skipped << " skipped: " << off << " m/s";
+  }
+}
+
+// Repeated points, exact and nearly so, have no length to be held to.
+TYPED_TEST(KernelLengths, LeaveSegmentsWithoutLengthToTheSprings) {
+  using T = typename TypeParam::T;
+  for (const double tiny : {0.0, 2e-9, 5e-7}) {
+    Points rest(3, 5);
+    rest << 0, 2e-5, 2e-5 + tiny, 2e-5 + 2 * tiny, 0.01, 0, 0, 0, tiny, 0, 0, 0, 0, 0, 0;
+    oracle::Strand strand = oracle::make_strand(rest, {1e6, 1e6, 1e6, 1e2, 1e2});
+    strand.gravity = {0, -9.81, 0};
+    StrandRun<TypeParam> run({strand}, {RootPose{}}, false);
+    run.parameters.length_iterations = 8, run.parameters.length_tolerance = T(1e-4);
+    run.parameters.strain_limit = 1, run.parameters.speed_limit = 10;
+    for (int k = 0; k < 480; ++k) {
+      run.step({RootPose{}}, 1.0 / 240);
+      ASSERT_EQ(run.figure(0, kernels::kDiverged), 0) << "segments of " << tiny << " m, step " << k;
+      ASSERT_TRUE(run.figure(0, kernels::kStrain) <= 1.1e-4) << "segments of " << tiny << " m, step " << k;
+    }
+  }
+}
+
 // With forces: the step is the reference's step, then its successive projections, then the velocities'
 // correction.
 TYPED_TEST(KernelLengths, FollowTheStepAndCorrectTheVelocities) {

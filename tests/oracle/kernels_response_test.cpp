@@ -145,6 +145,69 @@ TYPED_TEST(KernelResponse, StopsABulletAtAThinPlate) {
   }
 }
 
+// Plates as thick as a voxel, or half of one, and ways that end within the band: past the plate, or in it but
+// nearer to its far side.
+TYPED_TEST(KernelResponse, StopsAtPlatesAsThinAsHalfAVoxel) {
+  static const MeshSolid thick(box({-0.08, -0.006, -0.08}, {0.08, 0, 0.08}, 4), 0.006, 4),
+      thin(box({-0.08, -0.003, -0.08}, {0.08, 0, 0.08}, 4), 0.006, 4);
+  for (const MeshSolid* plate : {&thick, &thin})
+    for (const double start : {0.0, 0.001, 0.004})
+      for (const double way : {0.0045, 0.0065, 0.008, 0.012, 0.02}) {
+        const double speed = way / kStep;
+        const Particle after = this->respond(plate->view(0), {{0.01, start, 0}, {1, -speed, 0}});
+        EXPECT_TRUE(after.position.y() >= -1e-6)
+            << "from " << start << " by " << way << ": " << after.position.y();
+        if (way > start) {
+          EXPECT_TRUE(std::abs(after.velocity.y()) <= 2e-3 * speed) << after.velocity.y();
+          EXPECT_NEAR(after.position.x(), 0.01 + kStep, 1e-4) << "it slides on for the rest of its time";
+        }
+      }
+}
+
+// A plate that swings through resting hair takes it along, though no particle moves by itself.
+TYPED_TEST(KernelResponse, TakesAlongWhatARotatingPlateMeets) {
+  static const MeshSolid plate(box({-0.08, -0.006, -0.08}, {0.08, 0, 0.08}, 4), 0.006, 4);
+  kernels::SolidView solid = plate.view(0);
+  const double turn = 0.25;  // about z: the end at x = 0.07 rises by 17 mm
+  const Eigen::Matrix3d after = Eigen::AngleAxisd(turn, Vector3d::UnitZ()).toRotationMatrix();
+  for (int k = 0; k < 9; ++k) solid.rotation[k] = after(k / 3, k % 3);
+  for (const double height : {0.001, 0.006, 0.012}) {
+    const Particle met = this->respond(solid, {{0.07, height, 0}, Vector3d::Zero()});
+    const Vector3d seen = after.transpose() * met.position;
+    EXPECT_TRUE(seen.y() >= -1e-6) << "from " << height << ": " << seen.y() << " m above the plate";
+    EXPECT_GT(met.velocity.y(), 1) << "the plate's end rises at some 4 m/s";
+  }
+}
+
+// Figures of the contact stage: strains without projection, speeds, and who is beyond a limit.
+TYPED_TEST(KernelResponse, ReportsStrandsBeyondTheLimits) {
+  Points rest(3, 3);
+  rest << Vector3d::Zero(), Vector3d(0, 0.004, 0), Vector3d(0, 0.008, 0);
+  const oracle::Strand strand = oracle::make_strand(rest, {});
+  const RootPose buried{oracle::Mat3::Identity(), {0, -0.0065, 0}},
+      away{oracle::Mat3::Identity(), {0, 0.5, 0}};
+  const struct {
+    double strain, speed;
+    bool diverged;
+  } cases[] = {{10, 10, false}, {0.1, 10, true}, {10, 0.01, true}};
+  for (const auto& c : cases) {
+    StrandRun<TypeParam> run({strand, strand}, {buried, away}, false);
+    run.parameters.step = kStep;
+    run.parameters.strain_limit = c.strain, run.parameters.speed_limit = c.speed;
+    oracle::State state = run.get(0);
+    state.velocity.col(2) = Vector3d(0.5, 0.2, 0);
+    run.set(0, state);
+    run.collide({block().view()});
+    const double strain = oracle::worst_edge_strain(strand, run.get(0).position);
+    EXPECT_GT(strain, 0.2) << "particle 1 was pushed out by 2.5 mm";
+    EXPECT_NEAR(run.contact_figure(0, kernels::kContactStrain), strain, 1e-5);
+    EXPECT_NEAR(run.contact_figure(0, kernels::kContactSpeed), std::hypot(0.5, 0.2), 1e-5);
+    EXPECT_EQ(run.contact_figure(0, kernels::kContactDiverged), c.diverged ? 1 : 0)
+        << c.strain << " " << c.speed;
+    EXPECT_EQ(run.contact_figure(1, kernels::kContactDiverged), 0) << "touches nothing";
+  }
+}
+
 // A segment of 12 cm falls on a rod as thick as a finger that lies halfway between its particles.
 TYPED_TEST(KernelResponse, KeepsAThinRodFromPassingBetweenParticles) {
   static const MeshSolid rod(box({0.052, -0.028, -0.04}, {0.068, -0.012, 0.04}, 4), 0.004);

@@ -17,10 +17,11 @@ inline MeshDistance with_openings_closed(std::vector<MeshDistance::Vec3> vertice
   std::map<std::array<double, 3>, std::int32_t> at_place;
   std::vector<std::int32_t> joined;
   for (const auto& v : vertices)
-    joined.push_back(at_place.try_emplace({v.x(), v.y(), v.z()}, static_cast<std::int32_t>(joined.size()))
-                         .first->second);
+    joined.push_back(
+        at_place.try_emplace({v.x(), v.y(), v.z()}, static_cast<std::int32_t>(joined.size())).first->second);
   // Boundary edges belong to an odd number of triangles; the last to name one gives its direction.
-  std::map<std::pair<std::int32_t, std::int32_t>, std::pair<int, std::pair<std::int32_t, std::int32_t>>> edges;
+  std::map<std::pair<std::int32_t, std::int32_t>, std::pair<int, std::pair<std::int32_t, std::int32_t>>>
+      edges;
   for (const auto& t : triangles) {
     const std::int32_t v[3] = {joined[t[0]], joined[t[1]], joined[t[2]]};
     if (v[0] == v[1] || v[1] == v[2] || v[2] == v[0]) continue;

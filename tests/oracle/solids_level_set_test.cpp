@@ -40,7 +40,7 @@ void for_each_band_voxel(const kernels::LevelSetView& view, Visit visit) {
         const std::int32_t tile = view.tile[(x / 8 * n[1] + y / 8) * n[2] + z / 8];
         if (tile < 0) continue;
         const int voxel = tile * 512 + ((x & 7) << 6 | (y & 7) << 3 | (z & 7));
-        if (view.triangle[voxel] < 0) continue;
+        if (std::abs(view.distance[voxel]) >= view.background) continue;
         visit(view.voxel_size *
                   Vec3(x + 8 * view.tile_min[0], y + 8 * view.tile_min[1], z + 8 * view.tile_min[2]),
               view.distance[voxel], view.triangle[voxel]);
@@ -56,8 +56,8 @@ float value_at(const kernels::LevelSetView& view, const Vec3& position) {
   }
   const std::int32_t tile =
       view.tile[(v[0] / 8 * view.tile_count[1] + v[1] / 8) * view.tile_count[2] + v[2] / 8];
-  if (tile == kernels::kTileInside) return -view.background;
   if (tile == kernels::kTileOutside) return view.background;
+  if (tile < 0) return -view.background;
   return view.distance[tile * 512 + ((v[0] & 7) << 6 | (v[1] & 7) << 3 | (v[2] & 7))];
 }
 

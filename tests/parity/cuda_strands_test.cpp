@@ -149,7 +149,7 @@ class Solids {
 
 TEST_F(Cuda, ContactsAgree) {
   const StrandParameters<float> parameters = default_parameters();
-  const ContactParameters contact{parameters.step, 1, 4, 3, 1e-4f, 0, 0, 0, 0};
+  const ContactParameters contact{parameters.step, 1, 4, 3, 1e-4f, 10, 1000, 0, 0};
   HostGroom host(helices(100));
   host.skin[3] = kIgnoresHome;
   DeviceGroom device(host);
@@ -197,7 +197,7 @@ TEST_F(Cuda, LaunchesAreNamedAndTimed) {
   host.move_roots(parameters.step);
   device.move_roots(host);
   for (int k = 0; k < 300; ++k) device.strands->strand_step(parameters);
-  device.strands->contact_step({parameters.step, 1, 4, 3, 1e-4f});
+  device.strands->contact_step({parameters.step, 1, 4, 3, 1e-4f, 10, 1000, 0, 0});
   const std::vector<CudaLaunches> launches = device.strands->launches();
   ASSERT_EQ(launches.size(), 2u);
   EXPECT_EQ(launches[0].name, "strand step");

@@ -27,6 +27,7 @@ inline kernels::StrandParameters<float> default_parameters() {
           .clamped = 1,
           .length_iterations = 3,
           .length_tolerance = 1e-4f,
+          .skipped_substeps = 0,
           .strain_limit = 10,
           .speed_limit = 1000};
 }
@@ -129,7 +130,10 @@ struct HostGroom {
             .rounds = 4,
             .length_iterations = 3,
             .length_tolerance = 1e-4f,
-            .figures = contact_figures.data()};
+            .figures = contact_figures.data(),
+            .strain_limit = 10,
+            .speed_limit = 1000,
+            .skipped_substeps = 0};
   }
   void collide(std::span<const kernels::SolidView> solids, float h) {
     for_each_lane([&, step = contact_step(solids, h)](int batch, int lane) {

@@ -24,11 +24,11 @@ namespace {
 
 using oracle::MeshDistance;
 
-constexpr double kDepth = 0.5e-3;      // [m] deepest that a particle may end a frame inside the mesh
-constexpr double kFreeStrain = 1e-3;   // of strands that no solid moved
-constexpr double kMovedStrain = 1e-2;  // of those that one did, 99.9th percentile
+constexpr double kDepth = 0.5e-3;          // [m] deepest that a particle may end a frame inside the mesh
+constexpr double kFreeStrain = 1e-3;       // of strands that no solid moved
+constexpr double kMovedStrain = 1e-2;      // of those that one did, 99.9th percentile
 constexpr double kShortestSegment = 1e-6;  // [m] shorter ones are not held to their lengths
-constexpr double kRounding = 4e-7;     // of a length between points in single precision, of their coordinates
+constexpr double kRounding = 4e-7;  // of a length between points in single precision, of their coordinates
 constexpr double kStrainRounding = 2e-5;
 
 std::filesystem::path data_folder() {
@@ -123,7 +123,8 @@ class FrameChecks {
         const double now = (point(frame.position, i + 1) - point(frame.position, i)).norm(),
                      rest = rest_edge(i);
         const double rounding = kRounding * point(frame.position, i).norm();
-        if (rest >= kShortestSegment) strain[s] = std::max(strain[s], (std::abs(now - rest) - rounding) / rest);
+        if (rest >= kShortestSegment)
+          strain[s] = std::max(strain[s], (std::abs(now - rest) - rounding) / rest);
       }
     });
     if (frame.number == header_.first_frame) return;  // not stepped yet: no figures
@@ -243,8 +244,7 @@ INSTANTIATE_TEST_SUITE_P(
                   48113,
                   192452,
                   8},
-        RealGroom{
-            "stubble", {{"/head/mesh", "face/head_morph.glb"}}, {"/frames/last=25"}, 12000, 48000, 6}),
+        RealGroom{"stubble", {{"/head/mesh", "face/head_morph.glb"}}, {"/frames/last=25"}, 12000, 48000, 6}),
     [](const auto& info) { return std::string(info.param.scene); });
 
 class Quiet : public testing::Test {

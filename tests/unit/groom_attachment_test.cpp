@@ -148,6 +148,48 @@ TEST(GroomAttachment, RigidMotionIsFollowed) {
   }
 }
 
+// Snapped strands keep their shapes, and their roots lie on the head, moved or not.
+TEST(GroomAttachment, SnappedRootsLieOnTheHead) {
+  Moving m;
+  Random random(31, 0);
+  Strands strands;
+  for (const Vec3& root : m.roots) {
+    for (int i = 0; i < 3; ++i) strands.points.push_back(root + 0.01 * i * random_vector(random));
+    strands.offsets.push_back(static_cast<std::int64_t>(strands.points.size()));
+  }
+  strands.groups.assign(m.roots.size(), 0);
+  scene::Groom desc = nearest();
+  Strands kept = strands;
+  Attachment::to_head(kept, m.head.scalp(), desc).place(kept);
+  EXPECT_EQ(kept.points, strands.points);
+
+  desc.root_offset = scene::RootOffset::kSnap;
+  const Attachment held = Attachment::to_head(strands, m.head.scalp(), desc);
+  Strands snapped = strands;
+  held.place(snapped);
+  double farthest = 0;
+  for (std::size_t s = 0; s < strands.size(); ++s) {
+    const auto first = strands.offsets[s];
+    const Vec3 shift = snapped.points[first] - strands.points[first];
+    farthest = std::max(farthest, shift.norm());
+    for (auto i = first; i < strands.offsets[s + 1]; ++i)
+      ASSERT_TRUE((snapped.points[i] - strands.points[i] - shift).norm() <= 1e-15);
+  }
+  EXPECT_GT(farthest, 0.005);
+  std::vector<Vec3> bent;
+  for (const Vec3& v : m.head.vertices) bent.emplace_back(v.x() + 0.3 * v.y(), v.y(), v.z() * 1.2);
+  for (const auto& vertices : {m.head.vertices, bent}) {
+    held.pose(vertices, m.poses);
+    for (std::size_t s = 0; s < strands.size(); ++s) {
+      const RootSite& site = held.sites()[s];
+      const Triangle& t = m.head.triangles[site.triangle];
+      const Vec3 on_head = site.barycentric[0] * vertices[t[0]] + site.barycentric[1] * vertices[t[1]] +
+                           site.barycentric[2] * vertices[t[2]];
+      ASSERT_TRUE((m.poses[s].position - on_head).norm() <= 1e-14);
+    }
+  }
+}
+
 TEST(GroomAttachment, DeformationKeepsRotationsOrthonormal) {
   Moving m;
   const Attachment held = Attachment::to_head(strands_at(m.roots), m.head.scalp(), nearest());

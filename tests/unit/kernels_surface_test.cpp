@@ -80,7 +80,8 @@ TYPED_TEST(KernelSurface, IsTheMeshNearTheSurface) {
   const kernels::SolidView view = solid.view();
   for (int trial = 0; trial < 4000; ++trial) {
     const Vector3d p = this->near_sphere(0.1, 0.0045);
-    const kernels::SurfaceSample<T> at = kernels::sample_surface(view, to_kernel<T>(p), kernels::Patch{}, T(kVoxel));
+    const kernels::SurfaceSample<T> at =
+        kernels::sample_surface(view, to_kernel<T>(p), kernels::Patch{}, T(kVoxel));
     ASSERT_TRUE(at.exact);
     const double distance = mesh.signed_distance(p);
     ASSERT_NEAR(at.distance, distance, distance > 0 ? this->kRounding + 1e-8 : 0.1 * kVoxel);
@@ -97,6 +98,7 @@ TYPED_TEST(KernelSurface, IsTheMeshNearTheSurface) {
 TYPED_TEST(KernelSurface, KnowsTheSideFarFromTheSurface) {
   using T = TypeParam;
   const MeshSolid solid(icosphere(0.1, 2), 0.006);
+  const oracle::MeshDistance mesh(solid.surface.vertices, solid.surface.triangles);
   const kernels::SolidView view = solid.view();
   const auto at = [&](double r) {
     return kernels::sample_surface(view, to_kernel<T>({0.6 * r, 0.8 * r, 0}));
@@ -109,7 +111,11 @@ TYPED_TEST(KernelSurface, KnowsTheSideFarFromTheSurface) {
     const kernels::SurfaceSample<T> sample = at(inside);
     EXPECT_TRUE(sample.exact);
     EXPECT_NEAR(sample.distance, inside - 0.1, 0.003);
-    EXPECT_GT(from_kernel(sample.normal).dot(Vector3d(0.6, 0.8, 0)), 0.9) << inside;
+    const Vector3d p(0.6 * inside, 0.8 * inside, 0), normal = from_kernel(sample.normal);
+    EXPECT_NEAR(mesh.closest(p - sample.distance * normal).distance, 0, 1e-7);
+    if (inside > 0.02) {  // about the middle every way out is as short
+      EXPECT_GT(normal.dot(p.normalized()), 0.9) << inside;
+    }
   }
 }
 
@@ -159,7 +165,8 @@ TYPED_TEST(KernelSurface, BlendsTwoLevelSets) {
   view.vertices_before = small.vertices.data();
   for (int trial = 0; trial < 2000; ++trial) {
     const Vector3d p = this->near_sphere(0.103, 0.0045);
-    const kernels::SurfaceSample<T> at = kernels::sample_surface(view, to_kernel<T>(p), kernels::Patch{}, T(0.006));
+    const kernels::SurfaceSample<T> at =
+        kernels::sample_surface(view, to_kernel<T>(p), kernels::Patch{}, T(0.006));
     ASSERT_TRUE(at.exact);
     const double distance = mesh.signed_distance(p);
     ASSERT_NEAR(at.distance, distance, distance > 0 ? this->kRounding + 1e-8 : 6e-4);

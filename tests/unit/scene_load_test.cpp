@@ -110,6 +110,7 @@ TEST_F(SceneLoad, ReadsGrooms) {
   EXPECT_EQ(s.grooms[0].file, folder_ / "a.hair");
   EXPECT_THAT(s.grooms[0].more, testing::ElementsAre(folder_ / "b.hair"));
   EXPECT_EQ(s.grooms[0].attach, Attach::kNearest);
+  EXPECT_EQ(s.grooms[0].root_offset, RootOffset::kSnap);
   EXPECT_EQ(s.grooms[0].penetration, Penetration::kKeep);
   ASSERT_EQ(s.grooms[0].stiffness.size(), 1u);
   EXPECT_EQ(s.grooms[0].stiffness[0].group, "a");
@@ -228,6 +229,8 @@ TEST_F(SceneLoad, FillsInExactlyTheSchemasDefaults) {
       {defs + "groom/properties/attach", "/groom/0/attach",
        word(is(groom.attach, Attach::kNearest), "nearest")},
       {defs + "groom/properties/attach_distance", "/groom/0/attach_distance", groom.attach_distance},
+      {defs + "groom/properties/root_offset", "/groom/0/root_offset",
+       word(is(groom.root_offset, RootOffset::kKeep), "keep")},
       {defs + "groom/properties/penetration", "/groom/0/penetration",
        word(is(groom.penetration, Penetration::kPushOut), "push_out")},
       {defs + "groom/then/properties/name", "/groom/1/name", s.grooms[1].name},
@@ -488,6 +491,7 @@ TEST_F(SceneLoad, KnowsEveryWordOfTheSchema) {
       {"/definitions/length_unit/then/enum", "/units/length"},
       {"/definitions/interpolation/enum", "/head/animation/interpolation"},
       {"/definitions/groom/properties/attach/enum", "/groom/0/attach"},
+      {"/definitions/groom/properties/root_offset/enum", "/groom/0/root_offset"},
       {"/definitions/groom/properties/penetration/enum", "/groom/0/penetration"},
       {"/definitions/stiffness_scale/properties/coupling/enum", "/groom/0/stiffness/0/coupling"},
       {"/definitions/model/properties/type/enum", "/model/type"},

@@ -77,7 +77,8 @@ class SceneTest : public testing::Test {
         }
       },
       "groom": [
-        {"file": ["a.hair", "b.hair"], "attach": "nearest", "attach_distance": 3, "penetration": "keep",
+        {"file": ["a.hair", "b.hair"], "attach": "nearest", "attach_distance": 3,
+         "root_offset": "snap", "penetration": "keep",
          "units": {"length": 0.5, "up": "x"}, "width": 0.01,
          "stiffness": [{"group": "a", "coupling": "edge", "curve": [[0, 1], [0.5, 0.25]]}]},
         {"name": "skin", "file": "c.tfx", "skin": "c.tfxskin", "attach": "fixed",

@@ -12,8 +12,8 @@ using kernels::kLanes;
 template <class T>
 class ContactStage : public Stage<T> {
  public:
-  ContactStage(const scene::Scene& scene, std::vector<solids::Solid>& solids,
-               const Skin& skin, const state::StrandModel<T>& model, state::StrandState<T>& state)
+  ContactStage(const scene::Scene& scene, std::vector<solids::Solid>& solids, const Skin& skin,
+               const state::StrandModel<T>& model, state::StrandState<T>& state)
       : scene_(scene),
         solids_(solids),
         model_(model),
@@ -99,19 +99,16 @@ class ContactStage : public Stage<T> {
 
 template <class T>
 std::unique_ptr<Stage<T>> make_contact_stage(const scene::Scene& scene, std::vector<solids::Solid>& solids,
-                                             const Skin& skin,
-                                             const state::StrandModel<T>& model,
+                                             const Skin& skin, const state::StrandModel<T>& model,
                                              state::StrandState<T>& state) {
   return std::make_unique<ContactStage<T>>(scene, solids, skin, model, state);
 }
 
 template std::unique_ptr<Stage<float>> make_contact_stage(const scene::Scene&, std::vector<solids::Solid>&,
-                                                          const Skin&,
-                                                          const state::StrandModel<float>&,
+                                                          const Skin&, const state::StrandModel<float>&,
                                                           state::StrandState<float>&);
 template std::unique_ptr<Stage<double>> make_contact_stage(const scene::Scene&, std::vector<solids::Solid>&,
-                                                           const Skin&,
-                                                           const state::StrandModel<double>&,
+                                                           const Skin&, const state::StrandModel<double>&,
                                                            state::StrandState<double>&);
 
 }  // namespace ringlet::effects

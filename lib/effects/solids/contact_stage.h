@@ -1,7 +1,7 @@
 // Hair against solids: level sets, friction, push-out, in turn with lengths.
 #pragma once
-#include <memory>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "effects/stage.h"
@@ -19,8 +19,7 @@ struct Skin {
 // All but `skin` must outlive the stage.
 template <class T>
 std::unique_ptr<Stage<T>> make_contact_stage(const scene::Scene& scene, std::vector<solids::Solid>& solids,
-                                             const Skin& skin,
-                                             const state::StrandModel<T>& model,
+                                             const Skin& skin, const state::StrandModel<T>& model,
                                              state::StrandState<T>& state);
 
 }  // namespace ringlet::effects

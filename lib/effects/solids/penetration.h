@@ -17,9 +17,9 @@ struct PenetrationReport {
 };
 
 // One groom's strands against one solid; `skin` holds the triangle that each grows on, or a kernels::Skin.
-// `points` (world, at the pose of `solid`) are moved where `policy` is push_out; `skin` becomes kIgnoresHome for
-// buried strands and those too short to matter; `prune` becomes 1 for
-// strands to be left out (policy prune: those that have particles inside). Root particles stay.
+// `points` (world, at the pose of `solid`) are moved where `policy` is push_out; `skin` becomes kIgnoresHome
+// for buried strands and those too short to matter; `prune` becomes 1 for strands to be left out (policy
+// prune: those that have particles inside). Root particles stay.
 PenetrationReport resolve_penetration(scene::Penetration policy, const kernels::SolidView& solid,
                                       std::span<const std::int64_t> offsets, std::span<Vec3> points,
                                       std::span<std::int32_t> skin, std::span<unsigned char> prune);

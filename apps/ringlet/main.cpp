@@ -51,7 +51,7 @@ void add_scene(CLI::App& command, std::string& file, std::vector<std::string>& o
       ->option_text("POINTER=JSON");
 }
 
-void add_run(CLI::App& app, Job& job) {
+void add_run(CLI::App& app, const bool& quiet, Job& job) {
   CLI::App* command = app.add_subcommand("run", "simulate a scene and write its cache");
   const auto options = std::make_shared<RunOptions>();
   add_scene(*command, options->scene.file, options->scene.overrides);
@@ -64,7 +64,12 @@ void add_run(CLI::App& app, Job& job) {
   command->add_option("--progress", options->progress, "how to tell how far it is")
       ->check(CLI::IsMember({"auto", "bar", "plain", "json", "none"}))
       ->option_text("auto/bar/plain/json/none");
-  command->callback([options, &job] { job = [options] { return run_run(*options); }; });
+  command->callback([options, &quiet, &job] {
+    job = [options, &quiet] {
+      if (quiet && options->progress == "auto") options->progress = "none";
+      return run_run(*options);
+    };
+  });
 }
 
 void add_plan(CLI::App& app, Job& job) {
@@ -153,6 +158,18 @@ void add_bench(CLI::App& app, Job& job) {
   command->callback([options, &job] { job = [options] { return run_bench(*options); }; });
 }
 
+// The first word of the command line where it should be a subcommand and is none; else empty.
+std::string unknown_subcommand(const CLI::App& app, int argc, char** argv) {
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    if (word.starts_with('-')) continue;
+    const bool known =
+        !app.get_subcommands([&](const CLI::App* one) { return one->check_name(word); }).empty();
+    return known ? std::string() : word;
+  }
+  return {};
+}
+
 int report(const Error& error) {
   for (const Problem& problem : error.problems()) fmt::print(stderr, "error: {}\n", to_string(problem));
   return static_cast<int>(error.kind());
@@ -163,10 +180,11 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", RINGLET_VERSION);
   app.require_subcommand(1);
   bool quiet = false, verbose = false;
-  app.add_flag("-q,--quiet", quiet, "warnings only");
+  app.add_flag("-q,--quiet", quiet, "warnings only, and no progress unless asked for");
   app.add_flag("-v,--verbose", verbose, "more of what is done");
   Job job;
-  add_run(app, job);
+  app.fallthrough();  // -q and -v after the subcommand too
+  add_run(app, quiet, job);
   add_plan(app, job);
   add_validate(app, job);
   add_info(app, job);
@@ -178,7 +196,9 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     const bool asked = error.get_exit_code() == 0;  // --help, --version
     if (asked) return app.exit(error);
-    fmt::print(stderr, "error: command line: {} (see `ringlet --help`)\n", error.what());
+    const std::string unknown = unknown_subcommand(app, argc, argv);
+    const std::string what = unknown.empty() ? error.what() : fmt::format("`{}` is no subcommand", unknown);
+    fmt::print(stderr, "error: command line: {} (see `ringlet --help`)\n", what);
     return static_cast<int>(ErrorKind::kUsage);
   }
   set_log_level(verbose ? LogLevel::kDebug : quiet ? LogLevel::kWarning : LogLevel::kInfo);

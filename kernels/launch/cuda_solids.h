@@ -41,14 +41,14 @@ class CudaSolid {
     if (stale || moving || moved || host.vertices != last_.vertices)
       vertices_.upload({host.vertices, 3 * vertex_count_}, stream);
     if (moving) vertices_before_.upload({host.vertices_before, 3 * vertex_count_}, stream);
-    if (host.crossings.start != nullptr && (stale || moving || moved))
-      upload_crossings(host.crossings, stream);
+    if (host.folded_tiles != nullptr && (stale || moving || moved)) upload_folds(host, stream);
     last_ = host, interval_ = interval;
     return view(host);
   }
   std::size_t bytes() const {
     return level_set_[0].bytes() + level_set_[1].bytes() + triangles_.bytes() + neighbours_.bytes() +
-           vertices_.bytes() + vertices_before_.bytes() + bin_start_.bytes() + bin_triangle_.bytes();
+           vertices_.bytes() + vertices_before_.bytes() + bin_start_.bytes() + bin_triangle_.bytes() +
+           folded_tiles_.bytes();
   }
 
  private:
@@ -72,10 +72,13 @@ class CudaSolid {
     neighbours_.upload({host.neighbours, triangles.size()}, stream);
     vertex_count_ = triangles.empty() ? 0 : std::size_t(*std::ranges::max_element(triangles)) + 1;
   }
-  void upload_crossings(const CrossingsView& host, cudaStream_t stream) {
-    const std::size_t bins = std::size_t(host.count[0]) * host.count[1];
-    bin_start_.upload({host.start, bins + 1}, stream);
-    bin_triangle_.upload({host.triangle, std::size_t(host.start[bins])}, stream);
+  void upload_folds(const SolidView& host, cudaStream_t stream) {
+    const CrossingsView& crossings = host.crossings;
+    const std::size_t bins = std::size_t(crossings.count[0]) * crossings.count[1];
+    bin_start_.upload({crossings.start, bins + 1}, stream);
+    bin_triangle_.upload({crossings.triangle, std::size_t(crossings.start[bins])}, stream);
+    const std::int32_t* tiles = host.level_set[0].tile_count;
+    folded_tiles_.upload({host.folded_tiles, std::size_t(tiles[0]) * tiles[1] * tiles[2]}, stream);
   }
   SolidView view(SolidView host) const {
     host.level_set[1] = level_set_[two_level_sets(host) ? 1 : 0].view(host.level_set[1]);
@@ -83,8 +86,9 @@ class CudaSolid {
     host.vertices_before = deforms(host) ? vertices_before_.data() : vertices_.data();
     host.vertices = vertices_.data();
     host.triangles = triangles_.data(), host.neighbours = neighbours_.data();
-    if (host.crossings.start == nullptr) return host;
+    if (host.folded_tiles == nullptr) return host;
     host.crossings.start = bin_start_.data(), host.crossings.triangle = bin_triangle_.data();
+    host.folded_tiles = folded_tiles_.data();
     return host;
   }
 
@@ -92,6 +96,7 @@ class CudaSolid {
   std::int64_t interval_ = 0;
   CudaLevelSet level_set_[2];
   DeviceBuffer<std::int32_t> triangles_, neighbours_, bin_start_, bin_triangle_;
+  DeviceBuffer<unsigned char> folded_tiles_;
   DeviceBuffer<float> vertices_, vertices_before_;
   std::size_t vertex_count_ = 0;
 };

@@ -142,14 +142,17 @@ RINGLET_FUNCTION Entry<T> hidden_entry(const StrandContact<T>& contact, Vector3<
   return find_entry(contact, p, way, distance);
 }
 
-// The velocity and push-out stages for one particle; true where it touched.
+// The velocity and push-out stages for one particle; true where it touched. `clearance` becomes how far
+// outside the solid it is at least [m].
 template <class T>
 RINGLET_FUNCTION bool collide_particle(const StrandContact<T>& contact, Vector3<T>& x, Vector3<T>& v,
-                                       Vector3<T>& normal, LaneFigures<T>& figures) {
+                                       Vector3<T>& normal, T& clearance, LaneFigures<T>& figures) {
   SurfaceSample<T> at = contact.sample(x);
+  clearance = max(T(0), at.distance);
   const Entry<T> entry = hidden_entry(contact, x, v, at, figures);
   if (entry.found) at = contact.sample(entry.x);
   if (!at.exact || !(entry.found || at.distance < T(0))) return false;
+  clearance = T(0);
   normal = contact.world_normal(at);
   const Vector3<T> changed = contact.respond(at, normal, v);
   if (entry.found)

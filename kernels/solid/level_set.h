@@ -12,12 +12,18 @@ RINGLET_FUNCTION int floor_to_int(T a) {
   return truncated - (a < static_cast<T>(truncated) ? 1 : 0);
 }
 
-// The tile number of the tile at these tile coordinates, kTileOutside beyond the grid.
-RINGLET_FUNCTION std::int32_t tile_at(const LevelSetView& set, int x, int y, int z) {
+// Where the table of tiles has these tile coordinates, -1 beyond it.
+RINGLET_FUNCTION std::int32_t table_index(const LevelSetView& set, int x, int y, int z) {
   const int i = x - set.tile_min[0], j = y - set.tile_min[1], k = z - set.tile_min[2];
   if (i < 0 || j < 0 || k < 0 || i >= set.tile_count[0] || j >= set.tile_count[1] || k >= set.tile_count[2])
-    return kTileOutside;
-  return set.tile[(i * set.tile_count[1] + j) * set.tile_count[2] + k];
+    return -1;
+  return (i * set.tile_count[1] + j) * set.tile_count[2] + k;
+}
+
+// The tile number there, kTileOutside beyond the table.
+RINGLET_FUNCTION std::int32_t tile_at(const LevelSetView& set, int x, int y, int z) {
+  const std::int32_t index = table_index(set, x, y, z);
+  return index < 0 ? kTileOutside : set.tile[index];
 }
 
 // Where a voxel's values are; where it has none, its tile's number.

@@ -50,7 +50,8 @@ struct ContactStep {
 
 inline namespace RINGLET_ISA {
 
-inline constexpr int kContactReals = 3 + 3 + 3 + kProjectionReals;  // position, velocity, normal, projection
+// Position, velocity, normal, clearance, projection.
+inline constexpr int kContactReals = 3 + 3 + 3 + 1 + kProjectionReals;
 
 // Push-outs under this [m] do not ask for another round.
 template <class T>
@@ -62,7 +63,9 @@ RINGLET_FUNCTION T settled_push() {
 template <class R>
 struct ContactPack {
   using T = Scalar<R>;
-  T *position, *velocity, *normal, *projection;
+  T *position, *velocity, *normal;
+  T* clearance;  // [particles] of the solid at hand: how far outside it the particle is at least
+  T* projection;
   int stride;
 
   RINGLET_FUNCTION Vector3<T> get(const T* array, int particle, int lane) const {
@@ -127,7 +130,7 @@ struct ContactLane {
       if (!contact.within_reach(reach)) return;
       for (int i = first(); i < count; ++i) {
         Vector3<T> x = pack.get(pack.position, i, in_pack), v = pack.get(pack.velocity, i, in_pack), n;
-        if (!collide_particle(contact, x, v, n, figures)) continue;
+        if (!collide_particle(contact, x, v, n, clearance(i), figures)) continue;
         figures.touched = true;
         pack.set(pack.position, i, in_pack, x), pack.set(pack.velocity, i, in_pack, v),
             pack.set(pack.normal, i, in_pack, n);
@@ -141,6 +144,7 @@ struct ContactLane {
   RINGLET_FUNCTION void push(LaneFigures<T>& figures, bool segments) const {
     figures.pushed = T(0);
     for_each_solid([&](const StrandContact<T>& contact) {
+      for (int i = 0; i < count; ++i) clearance(i) = T(0) - contact.band;  // lengths have moved all
       if (segments) push_segments(contact, figures);
       for (int i = first(); i < count; ++i) push_particle(contact, i, contact.sample(position(i)), figures);
     });
@@ -166,6 +170,7 @@ struct ContactLane {
   }
 
  private:
+  RINGLET_FUNCTION T& clearance(int i) const { return pack.clearance[i * pack.stride + in_pack]; }
   RINGLET_FUNCTION Vector3<T> position(int i) const { return pack.get(pack.position, i, in_pack); }
 
   // Out of the solid, without a change of the particle's own velocity; notes the normal.
@@ -185,7 +190,9 @@ struct ContactLane {
     const T allowed = static_cast<T>(kChordVoxels) * contact.voxel;
     for (int i = first(); i + 1 < count; ++i) {
       Vector3<T> a = position(i), b = position(i + 1);
-      const int pieces = static_cast<int>(min(T(64), length(b - a) / (T(2) * contact.voxel))) + 1;
+      const T along = length(b - a);
+      if (clearance(i) + clearance(i + 1) > along) continue;  // distances change no faster than places
+      const int pieces = static_cast<int>(min(T(64), along / (T(2) * contact.voxel))) + 1;
       for (int k = 1; k < pieces; ++k) {
         const T t = static_cast<T>(k) / static_cast<T>(pieces);
         const SurfaceSample<T> at = contact.sample_inside(fma(t, b - a, a));
@@ -237,8 +244,12 @@ struct PackContacts {
         x(step.state.position + base()),
         v(step.state.velocity + base()),
         count(load<R>(step.batches.count + batch * kLanes + lane)),
-        pack{scratch, scratch + 3 * particles * stride, scratch + 6 * particles * stride,
-             scratch + 9 * particles * stride, stride},
+        pack{scratch,
+             scratch + 3 * particles * stride,
+             scratch + 6 * particles * stride,
+             scratch + 9 * particles * stride,
+             scratch + 10 * particles * stride,
+             stride},
         lengths{pack.position,
                 pack.velocity,
                 R(T(1) / (step.step * T(1 + step.skipped_substeps))),

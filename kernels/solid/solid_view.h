@@ -48,7 +48,10 @@ struct SolidView {
   const float* vertices;           // [vertices][3] [m]
   std::int32_t triangle_count;
 
-  CrossingsView crossings;  // at the substep's end, where the surface passes through itself; else null
+  // Where the closest triangle does not tell inside from outside, at the substep's end: where the surface
+  // passes through itself or the solid is thin beside the voxels. Null where there is no such place.
+  CrossingsView crossings;
+  const unsigned char* folded_tiles;  // as level_set[0].tile: 1 near such a place
 };
 
 }  // namespace ringlet::kernels

@@ -158,10 +158,21 @@ struct Patch {
 // nothing beside the fold's size.
 inline constexpr float kAboveVoxels = 0.01f;
 
+// Whether the surface passes through itself about p, or the solid is thin there.
+template <class T>
+RINGLET_FUNCTION bool near_fold(const SolidView& solid, Vector3<T> p) {
+  if (solid.folded_tiles == nullptr) return false;
+  const LevelSetView& set = solid.level_set[0];
+  const T per_tile = T(0.125) / static_cast<T>(set.voxel_size);
+  const std::int32_t index = table_index(set, floor_to_int(p.x * per_tile), floor_to_int(p.y * per_tile),
+                                         floor_to_int(p.z * per_tile));
+  return index < 0 || solid.folded_tiles[index] != 0;  // beyond the table nothing is known
+}
+
 // Whether the triangle lies inside another part of the solid where it is closest to p.
 template <class T>
 RINGLET_FUNCTION bool is_covered(const SolidView& solid, std::int32_t triangle, Vector3<T> p) {
-  if (solid.crossings.start == nullptr) return false;
+  if (!near_fold(solid, p)) return false;
   const T above = static_cast<T>(kAboveVoxels * solid.level_set[0].voxel_size);
   return winding_number(solid, fma(above, unit_normal<T>(solid, triangle),
                                    p - closest_on_triangle(solid, triangle, p).to_point)) != 0;
@@ -206,7 +217,7 @@ RINGLET_OUTLINED SurfaceSample<T> sample_surface(const SolidView& solid, Vector3
   }
   bool inside = on_sheet || level.enclosed || told.distance < T(0) ||
                 distance < T(0) - static_cast<T>(kNearVoxels) * voxel;
-  if (!inside && solid.crossings.start != nullptr) on_sheet = inside = winding_number(solid, p) != 0;
+  if (!inside && near_fold(solid, p)) on_sheet = inside = winding_number(solid, p) != 0;
   const T away = abs(told.distance);
   const bool touching = away < T(1e-7);  // [m] no direction of its own
   const T side = inside ? T(-1) : T(1);

@@ -25,6 +25,9 @@ void check_header(const Files& files, const state::RunHeader& before, const stat
   check_scene(files, before, now);
   if (before.backend != now.backend)
     refuse(files, "its backend was " + before.backend + ", now " + now.backend);
+  // Instruction sets with fused multiply-add give the same bits; generic gives others.
+  if ((before.instruction_set == "generic") != (now.instruction_set == "generic"))
+    refuse(files, "its instruction set was " + before.instruction_set + ", now " + now.instruction_set);
   if (before.precision != now.precision)
     refuse(files, "its precision was " + before.precision + ", now " + now.precision);
   if (hash_of(before) != hash_of(now))

@@ -119,7 +119,7 @@ class Checks {
     const bool each = grow["strands_per_triangle"] != 0, total = grow["strands"] != 0;
     if (each == total)
       add(pointer + "/grow",
-          each ? "both strands and strands_per_triangle" : "neither strands nor strands_per_triangle",
+          each ? "both strands and strands_per_triangle" : "neither strands nor strands_per_triangle above 0",
           "one of them");
     const Json& scalp = grow["scalp"];
     if (scalp.contains("box"))

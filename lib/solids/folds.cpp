@@ -15,6 +15,10 @@ namespace {
 
 using Vector3f = Eigen::Vector3f;
 
+// A solid no thicker than this, in voxels, is thin: the triangles closest to the voxels about a point in it
+// may all be of one side.
+constexpr float kThinVoxels = 1.5f;
+
 std::vector<Vector3f> vertex_normals(const ClosedSurface& surface, std::span<const Vector3f> vertices) {
   std::vector<Vector3f> normals(vertices.size(), Vector3f::Zero());
   for (const Triangle& t : surface.triangles) {
@@ -38,39 +42,51 @@ bool pierces(const Vector3f& from, const Vector3f& to, const std::array<Vector3f
   return (normal.dot(a) > 0) != (normal.dot(corners[0] - to) > 0);
 }
 
-// Whether a test holds for any of [0, count); the rest is not looked at once one has been found.
-bool any_of(std::size_t count, const auto& test) {
-  std::atomic<bool> found = false;
+using Marks = std::vector<std::atomic<unsigned char>>;
+
+// Calls visit(i) for all of [0, count), many at a time.
+void for_all(std::size_t count, const auto& visit) {
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 256), [&](const auto& range) {
-    for (std::size_t i = range.begin(); i != range.end() && !found; ++i)
-      if (test(i)) found = true;
+    for (std::size_t i = range.begin(); i != range.end(); ++i) visit(i);
   });
-  return found;
 }
 
-bool any_covered(std::span<const Vector3f> vertices, std::span<const Vector3f> normals,
-                 const kernels::SolidView& solid, float above) {
-  return any_of(vertices.size(), [&](std::size_t v) {
-    const Vector3f x = vertices[v] + above * normals[v];
+// By vertices: those that another part covers, and those under which the solid is thin.
+void mark_by_vertices(const ClosedSurface& surface, std::span<const Vector3f> vertices,
+                      const Crossings& crossings, float voxel_size, Marks& folded) {
+  kernels::SolidView solid{};
+  solid.triangles = surface.triangles.front().data();
+  solid.vertices = vertices.front().data();
+  solid.crossings = crossings.view();
+  const auto is_inside = [&](const Vector3f& x) {
     return kernels::winding_number(solid, kernels::Vector3<float>{x.x(), x.y(), x.z()}) != 0;
+  };
+  const std::vector<Vector3f> normals = vertex_normals(surface, vertices);
+  std::vector<unsigned char> found(vertices.size());
+  for_all(vertices.size(), [&](std::size_t v) {
+    const bool covered = is_inside(vertices[v] + kernels::kAboveVoxels * voxel_size * normals[v]);
+    found[v] = covered || !is_inside(vertices[v] - kThinVoxels * voxel_size * normals[v]);
+  });
+  for_all(folded.size(), [&](std::size_t t) {
+    for (const std::int32_t v : surface.triangles[t])
+      if (found[static_cast<std::size_t>(v)]) folded[t] = 1;
   });
 }
 
-bool any_pierced(const ClosedSurface& surface, std::span<const Vector3f> vertices,
-                 const Crossings& crossings) {
+void mark_pierced(const ClosedSurface& surface, std::span<const Vector3f> vertices,
+                  const Crossings& crossings, Marks& folded) {
   const auto at = [&](std::int32_t v) -> const Vector3f& { return vertices[static_cast<std::size_t>(v)]; };
-  return any_of(surface.triangles.size(), [&](std::size_t t) {
-    bool found = false;
+  for_all(folded.size(), [&](std::size_t t) {
     for (std::size_t k = 0; k < 3; ++k) {
       const std::int32_t from = surface.triangles[t][k], to = surface.triangles[t][(k + 1) % 3];
       if (from > to && surface.neighbours[3 * t + k] >= 0) continue;  // the neighbour looks at it
       crossings.for_each_near(at(from), at(to), [&](std::int32_t other) {
         const Triangle& v = surface.triangles[static_cast<std::size_t>(other)];
-        const bool apart = std::ranges::find(v, from) == v.end() && std::ranges::find(v, to) == v.end();
-        found = found || (apart && pierces(at(from), at(to), {at(v[0]), at(v[1]), at(v[2])}));
+        if (std::ranges::find(v, from) != v.end() || std::ranges::find(v, to) != v.end()) return;
+        if (pierces(at(from), at(to), {at(v[0]), at(v[1]), at(v[2])}))
+          folded[t] = 1, folded[static_cast<std::size_t>(other)] = 1;
       });
     }
-    return found;
   });
 }
 
@@ -132,16 +148,44 @@ kernels::CrossingsView Crossings::view() const {
   return view;
 }
 
-bool has_folds(const ClosedSurface& surface, std::span<const Vector3f> vertices, float voxel_size) {
+std::vector<std::int32_t> folded_triangles(const ClosedSurface& surface, std::span<const Vector3f> vertices,
+                                           float voxel_size) {
   Crossings crossings;
   crossings.build(vertices, surface.triangles);
-  kernels::SolidView solid{};
-  solid.triangles = surface.triangles.front().data();
-  solid.vertices = vertices.front().data();
-  solid.crossings = crossings.view();
-  return any_covered(vertices, vertex_normals(surface, vertices), solid,
-                     kernels::kAboveVoxels * voxel_size) ||
-         any_pierced(surface, vertices, crossings);
+  Marks folded(surface.triangles.size());
+  mark_by_vertices(surface, vertices, crossings, voxel_size, folded);
+  mark_pierced(surface, vertices, crossings, folded);
+  std::vector<std::int32_t> result;
+  for (std::size_t t = 0; t < folded.size(); ++t)
+    if (folded[t]) result.push_back(static_cast<std::int32_t>(t));
+  return result;
+}
+
+void mark_tiles(const kernels::LevelSetView& level_set, std::span<const Vector3f> vertices,
+                std::span<const Triangle> triangles, std::span<const std::int32_t> chosen,
+                std::vector<unsigned char>& tiles) {
+  const auto count = [&](int axis) { return static_cast<std::size_t>(level_set.tile_count[axis]); };
+  tiles.assign(count(0) * count(1) * count(2), 0);
+  const float per_tile = 1 / (8 * level_set.voxel_size);
+  const Vector3f margin = Vector3f::Constant(2 * level_set.voxel_size);
+  for (const std::int32_t t : chosen) {
+    Eigen::AlignedBox3f box;
+    for (const std::int32_t v : triangles[static_cast<std::size_t>(t)])
+      box.extend(vertices[static_cast<std::size_t>(v)]);
+    int low[3], high[3];
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto tile = [&](float x) {
+        return std::clamp(static_cast<int>(std::floor(x * per_tile)) - level_set.tile_min[axis], 0,
+                          level_set.tile_count[axis] - 1);
+      };
+      low[axis] = tile(box.min()[axis] - margin[axis]), high[axis] = tile(box.max()[axis] + margin[axis]);
+    }
+    for (int x = low[0]; x <= high[0]; ++x)
+      for (int y = low[1]; y <= high[1]; ++y)
+        for (int z = low[2]; z <= high[2]; ++z)
+          tiles[(static_cast<std::size_t>(x) * count(1) + static_cast<std::size_t>(y)) * count(2) +
+                static_cast<std::size_t>(z)] = 1;
+  }
 }
 
 }  // namespace ringlet::solids

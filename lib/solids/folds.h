@@ -1,4 +1,5 @@
-// Folds: where a surface passes through itself, as skin does in an armpit or a limb that rests on another.
+// Folds: where the triangle closest to a point does not tell inside from outside, because the surface passes
+// through itself, as skin does in an armpit, or because the solid is thin beside the voxels.
 #pragma once
 #include <functional>
 #include <span>
@@ -29,7 +30,15 @@ class Crossings {
   std::vector<std::int32_t> start_, triangle_;
 };
 
-// Whether the surface has any: a vertex inside another part of it, or a triangle that another's edge pierces.
-bool has_folds(const ClosedSurface& surface, std::span<const Eigen::Vector3f> vertices, float voxel_size);
+// The triangles with a vertex that lies inside another part of the surface or over a thin part of the solid,
+// those that another's edge pierces, and those whose edge it is; in ascending order.
+std::vector<std::int32_t> folded_triangles(const ClosedSurface& surface,
+                                           std::span<const Eigen::Vector3f> vertices, float voxel_size);
+
+// As the table of `level_set`: 1 for tiles within two voxels of the triangles, whose vertices are now at
+// `vertices`.
+void mark_tiles(const kernels::LevelSetView& level_set, std::span<const Eigen::Vector3f> vertices,
+                std::span<const Triangle> triangles, std::span<const std::int32_t> chosen,
+                std::vector<unsigned char>& tiles);
 
 }  // namespace ringlet::solids

@@ -340,7 +340,10 @@ void read(Assimp::Importer& importer, const std::filesystem::path& file) {
 }  // namespace
 
 ImportedMesh import_mesh(const std::filesystem::path& file, const std::optional<std::string>& clip) {
-  if (!std::filesystem::is_regular_file(file)) throw Error(ErrorKind::kInput, file.string(), "no such file");
+  std::error_code unknown;
+  if (!std::filesystem::is_regular_file(file, unknown))
+    throw Error(ErrorKind::kInput, file.string(),
+                std::filesystem::exists(file, unknown) ? "is not a regular file" : "no such file");
   Assimp::Importer importer;
   read(importer, file);
   const std::unique_ptr<aiScene> scene(importer.GetOrphanedScene());

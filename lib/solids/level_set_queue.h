@@ -15,7 +15,7 @@ namespace ringlet::solids {
 // A deforming solid's surface at a frame.
 struct FrameSurface {
   std::shared_ptr<const LevelSet> level_set;
-  bool folded = false;  // has_folds
+  std::vector<std::int32_t> folded;  // folded_triangles
 
   std::size_t bytes() const { return level_set->bytes(); }
 };

@@ -29,8 +29,21 @@ Eigen::AlignedBox3d bounds_of(const std::vector<Vec3>& vertices) {
   return box;
 }
 
-float voxel_size(const scene::Solid& desc, const Eigen::AlignedBox3d& bounds) {
-  const double longest = bounds.sizes().maxCoeff();
+// Of a deforming mesh the longest of several instants: keys may scale it.
+double longest_side(const AnimatedMesh& mesh, double first_time, double last_time) {
+  double longest = bounds_of(mesh.rest_vertices()).sizes().maxCoeff();
+  if (mesh.motion() != Motion::kDeforming) return longest;
+  longest = 0;
+  constexpr int kInstants = 9;
+  std::vector<Vec3> vertices(mesh.vertex_count());
+  for (int k = 0; k < kInstants; ++k) {
+    mesh.sample(first_time + (last_time - first_time) * k / (kInstants - 1), vertices);
+    longest = std::max(longest, bounds_of(vertices).sizes().maxCoeff());
+  }
+  return longest;
+}
+
+float voxel_size(const scene::Solid& desc, double longest) {
   if (!(longest > 0)) throw Error(ErrorKind::kInput, desc.pointer, desc.name + " is a single point");
   const double voxel = desc.voxel.value_or(longest / desc.resolution);
   if (!(voxel > 0) || longest / voxel > kMostVoxels)
@@ -57,10 +70,9 @@ struct Solid::Impl {
         mesh(collider),
         fps(run.fps),
         surface(close_surface(desc.name, collider.rest_vertices(), collider.triangles())) {
-    const Eigen::AlignedBox3d bounds = bounds_of(mesh.rest_vertices());
-    origin = bounds.center();
-    options = {voxel_size(desc, bounds), desc.half_width, desc.level_set_cache.value_or(cache_directory),
-               name};
+    origin = bounds_of(mesh.rest_vertices()).center();
+    options = {voxel_size(desc, longest_side(mesh, first_time, (run.last - run.first) / run.fps)),
+               desc.half_width, desc.level_set_cache.value_or(cache_directory), name};
     view.friction = static_cast<float>(desc.friction);
     view.offset = static_cast<float>(desc.offset);
     view.triangles = surface.triangles.front().data();
@@ -100,15 +112,16 @@ struct Solid::Impl {
   }
 
   FrameSurface surface_of(const Vertices& now) const {
-    return {cached_level_set(surface, now, options), has_folds(surface, now, options.voxel_size)};
+    return {cached_level_set(surface, now, options), folded_triangles(surface, now, options.voxel_size)};
   }
 
-  // For the vertices now, where the surface has folds at either frame.
-  void find_crossings() {
-    view.crossings = {};
-    if (!pair.before.folded && !pair.after.folded) return;
+  // For the vertices now, where the surface passes through itself at either frame.
+  void find_folds() {
+    view.crossings = {}, view.folded_tiles = nullptr;
+    if (folded.empty()) return;
     crossings.build(vertices, surface.triangles);
-    view.crossings = crossings.view();
+    mark_tiles(view.level_set[0], vertices, surface.triangles, folded, folded_tiles);
+    view.crossings = crossings.view(), view.folded_tiles = folded_tiles.data();
   }
 
   // ---- Still and rigid --------------------------------------------------------------------------
@@ -121,8 +134,8 @@ struct Solid::Impl {
                          pair.before.level_set->distance.size() / 512, options.voxel_size,
                          1e-6 * pair.before.bytes(), timer.seconds()));
     warn_if_empty(*pair.before.level_set);
-    find_crossings();
     show(pair, 0);
+    find_folds();
     view.vertices_before = view.vertices = vertices.front().data();
   }
 
@@ -157,7 +170,7 @@ struct Solid::Impl {
     vertices_before.swap(vertices);
     vertices = local_at(time);
     vertices_time = time;
-    find_crossings();
+    find_folds();
     view.vertices_before = vertices_before.front().data();
     view.vertices = vertices.front().data();
     set_placement(view.rotation_before, view.translation_before, Mat3::Identity(), origin);
@@ -168,11 +181,13 @@ struct Solid::Impl {
     view.level_set[0] = level_sets.before.level_set->view();
     view.level_set[1] = level_sets.after.level_set->view();
     view.blend = static_cast<float>(blend);
+    folded.clear();
+    std::ranges::set_union(level_sets.before.folded, level_sets.after.folded, std::back_inserter(folded));
   }
 
   std::size_t bytes() const {
     return (vertices.size() + vertices_before.size()) * sizeof(Eigen::Vector3f) +
-           surface.triangles.size() * sizeof(Triangle) + crossings.bytes() +
+           surface.triangles.size() * sizeof(Triangle) + crossings.bytes() + folded_tiles.size() +
            (queue ? queue->bytes() : pair.before.bytes());
   }
 
@@ -184,8 +199,10 @@ struct Solid::Impl {
   LevelSetOptions options;
   kernels::SolidView view{};
   LevelSetQueue::Pair pair;
-  Crossings crossings;
-  Vertices vertices, vertices_before;  // at the substep's end and start
+  std::vector<std::int32_t> folded;         // triangles folded at either frame
+  Crossings crossings;                      // where there are any
+  std::vector<unsigned char> folded_tiles;  // likewise
+  Vertices vertices, vertices_before;       // at the substep's end and start
 
   std::optional<int> frame;             // whose level sets `pair` holds (deforming)
   std::optional<double> vertices_time;  // of `vertices` (deforming)

@@ -130,7 +130,7 @@ constexpr Case kMeaningCases[] = {
     {R"({"groom": {"file": null, "grow": {"strands": 9}}})",
      "scene#/groom/grow: found growth without a head, expected a head in the scene"},
     {R"({"head": {"mesh": "head.obj"}, "groom": {"file": null, "grow": {}}})",
-     "scene#/groom/grow: found neither strands nor strands_per_triangle, expected one of them"},
+     "scene#/groom/grow: found neither strands nor strands_per_triangle above 0, expected one of them"},
     {R"({"head": {"mesh": "head.obj"}, "groom": {"file": null, "grow": {"strands": 9, "strands_per_triangle": 1}}})",
      "scene#/groom/grow: found both strands and strands_per_triangle, expected one of them"},
     {R"({"head": {"mesh": "head.obj"}, "groom": {"file": null, "width": 0.1, "grow": {"strands": 9}}})",

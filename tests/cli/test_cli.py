@@ -292,6 +292,40 @@ def test_resume_refuses_another_scene(program, scene, tmp_path):
     assert result.returncode == 2 and "the scene's /model/substeps was 4 and is 7" in result.stderr
 
 
+def test_resume_refuses_an_instruction_set_that_rounds_otherwise(program, scene, tmp_path):
+    out = tmp_path / "out"
+    command = ["run", scene, "-o", out, "--backend", "cpu", "--instruction-set"]
+    assert run(program, *command, "generic", "--frames", "1-2").returncode == 0
+    result = run(program, *command, "generic", "--resume")
+    assert result.returncode == 0, result.stderr
+    best = run(program, "run", scene, "-o", out, "--backend", "cpu", "--resume")
+    if "generic" in best.stderr and best.returncode == 0:
+        pytest.skip("this processor has no fused multiply-add")
+    assert best.returncode == 2 and "its instruction set was generic, now avx" in best.stderr, best.stderr
+
+
+# ---- Quiet -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("place", ["before", "after"])
+def test_quiet_says_nothing(program, scene, tmp_path, place):
+    command = ["run", scene, "-o", tmp_path / "out"]
+    result = run(program, *(["-q", *command] if place == "before" else [*command, "-q"]))
+    assert result.returncode == 0 and result.stdout == "" and result.stderr == "", result
+    asked = run(program, "-q", *command, "--overwrite", "--progress", "plain")
+    assert f"frame {LAST}/{LAST}" in asked.stdout + asked.stderr
+
+
+def test_a_mistyped_subcommand_is_named(program):
+    result = run(program, "rum", "scene.json")
+    assert result.returncode == 2 and "`rum` is no subcommand" in result.stderr
+
+
+def test_what_is_no_file_is_not_called_missing(program):
+    result = run(program, "info", "/dev/null")
+    assert result.returncode == 3 and "no such file" not in result.stderr
+
+
 # ---- Grooms ----------------------------------------------------------------------------------------
 
 

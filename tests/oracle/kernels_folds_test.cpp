@@ -31,15 +31,18 @@ Surface two_balls() {
 struct FoldedSolid {
   MeshSolid mesh;
   std::vector<std::int32_t> start, triangle;
+  std::vector<unsigned char> everywhere;
 
   explicit FoldedSolid(Surface surface, double voxel)
       : mesh(std::move(surface), voxel), triangle(mesh.surface.triangles.size()) {
     std::iota(triangle.begin(), triangle.end(), 0);
     start = {0, static_cast<std::int32_t>(triangle.size())};
+    everywhere.assign(mesh.band.tile.size(), 1);
   }
   kernels::SolidView view() const {
     kernels::SolidView v = mesh.view();
     v.crossings = {{-1, -1}, 0.5f, {1, 1}, start.data(), triangle.data()};
+    v.folded_tiles = everywhere.data();
     return v;
   }
 };

@@ -17,8 +17,8 @@ std::vector<Eigen::Vector3f> floats(const Shape& shape) {
   return result;
 }
 
-bool folds(const Shape& shape) {
-  return has_folds(close_surface("shape", shape.vertices, shape.triangles), floats(shape), 0.004f);
+std::vector<std::int32_t> folds(const Shape& shape) {
+  return folded_triangles(close_surface("shape", shape.vertices, shape.triangles), floats(shape), 0.004f);
 }
 
 Shape two(double apart) {
@@ -28,26 +28,52 @@ Shape two(double apart) {
 }
 
 TEST(Folds, AreFoundWhereASurfacePassesThroughItself) {
-  EXPECT_FALSE(folds(sphere(0.1)));
-  EXPECT_FALSE(folds(two(0.2))) << "two apart";
-  EXPECT_TRUE(folds(two(0.12))) << "two that overlap";
-  EXPECT_TRUE(folds(two(0.02))) << "one hidden in the other";
+  EXPECT_TRUE(folds(sphere(0.1)).empty());
+  EXPECT_TRUE(folds(two(0.2)).empty()) << "two apart";
+  EXPECT_EQ(folds(two(0.02)).size(), sphere(0.05).triangles.size()) << "one hidden in the other";
+  // Of two that overlap those with a vertex inside the other, and a ring of those that cross.
+  const Shape overlap = two(0.12);
+  const std::vector<std::int32_t> folded = folds(overlap);
+  const std::size_t first = sphere(0.1).triangles.size();
+  for (std::size_t t = 0; t < overlap.triangles.size(); ++t) {
+    double deepest = 1e9;
+    for (const std::int32_t v : overlap.triangles[t]) {
+      const Vec3& x = overlap.vertices[static_cast<std::size_t>(v)];
+      const double outside = t < first ? (x - Vec3(0.12, 0, 0)).norm() - 0.05 : x.norm() - 0.1;
+      deepest = std::min(deepest, outside);
+    }
+    const bool found = std::ranges::binary_search(folded, static_cast<std::int32_t>(t));
+    if (std::abs(deepest) < 2e-3) continue;  // where the facets cross
+    EXPECT_EQ(found, deepest < 0) << t;
+  }
 }
 
-// Every vertex of both lies outside the other.
-TEST(Folds, AreFoundWhereOnlyEdgesPierce) {
-  const auto needle_through = [](double y) {
-    Shape shape;  // a flat wedge, and a needle along y
-    shape.vertices = {{-1, 0, -1}, {1, 0, -1}, {0, 0, 1}, {0, -0.05, 0}};
-    shape.triangles = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}};
-    Shape needle;
-    needle.vertices = {{-0.01, y - 0.5, -0.01}, {0.01, y - 0.5, -0.01}, {0, y - 0.5, 0.01}, {0, y + 0.5, 0}};
-    needle.triangles = {{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}};
-    shape.append(needle);
+TEST(Folds, AreFoundWhereTheSolidIsThinBesideTheVoxels) {
+  const auto plate = [](double thickness) {
+    Shape shape = sphere(0.1);
+    for (Vec3& v : shape.vertices) v.y() *= thickness / 0.2;
     return shape;
   };
-  EXPECT_TRUE(folds(needle_through(0.1)));
-  EXPECT_FALSE(folds(needle_through(2)));
+  EXPECT_TRUE(folds(plate(0.05)).size() < sphere(0.1).triangles.size() / 3) << "but for its rim";
+  EXPECT_EQ(folds(plate(0.004)).size(), sphere(0.1).triangles.size());
+}
+
+// Every vertex of both lies outside the other: a needle through a regular tetrahedron, and beside it.
+TEST(Folds, AreFoundWhereOnlyEdgesPierce) {
+  const auto folded_faces = [](double x) {
+    Shape shape;
+    shape.vertices = {{1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}};
+    shape.triangles = {{0, 1, 2}, {0, 3, 1}, {0, 2, 3}, {1, 3, 2}};
+    Shape needle;
+    needle.vertices = {{x - 0.1, -3, 0}, {x + 0.1, -3, 0.02}, {x, -3, 0.2}, {x + 0.02, 3, 0.1}};
+    needle.triangles = {{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}};
+    shape.append(needle);
+    int faces = 0;
+    for (const std::int32_t t : folds(shape)) faces += t < 4;
+    return faces;
+  };
+  EXPECT_EQ(folded_faces(0.4), 2) << "where it enters and where it leaves";
+  EXPECT_EQ(folded_faces(2), 0);
 }
 
 TEST(Folds, BinsHoldEveryTriangleThatARayMeets) {

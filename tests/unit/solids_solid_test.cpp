@@ -115,6 +115,13 @@ TEST_F(SolidTest, SubstepsMeet) {
   }
 }
 
+// The ball doubles: its voxels are a share of the largest it becomes.
+TEST_F(SolidTest, VoxelsMeasureTheMeshAsItMoves) {
+  const AnimatedMesh mesh = growing();
+  Solid solid(solid_desc(40), mesh, {1, 5, 24, 0}, 0, {});
+  EXPECT_NEAR(solid.at(0, 0.01).level_set[0].voxel_size, 0.4 / 40, 1e-4);
+}
+
 TEST_F(SolidTest, GivenVoxelCountsAndFlatSurfacesAreAllowed) {
   write("sheet.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n");
   const AnimatedMesh mesh(mesh_desc(directory / "sheet.obj"), kMetresYUp, kTwoSeconds);

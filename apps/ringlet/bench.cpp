@@ -1,8 +1,10 @@
 #include "bench.h"
 
 #include <fmt/format.h>
+#include <tbb/blocked_range.h>
 #include <tbb/global_control.h>
 #include <tbb/info.h>
+#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
@@ -67,6 +69,28 @@ kernels::StrandParameters<float> parameters(double step) {
   return p;
 }
 
+// The floor of any strand step: to read a substep's rest shape, lengths, positions and velocities and to
+// write the latter two, with one addition to each value. Nanoseconds per particle and core.
+double floor_nanoseconds(const state::StrandModel<float>& model, state::StrandState<float> state, int threads,
+                         int repeats) {
+  constexpr int kTimed = 32;
+  const std::size_t size = state.position.size();
+  const float *rest = model.rest.data(), *lengths = model.rest_length.data();
+  float *position = state.position.data(), *velocity = state.velocity.data();
+  std::vector<double> nanoseconds;
+  for (int repeat = 0; repeat < repeats; ++repeat) {
+    const Timer timer;
+    for (int k = 0; k < kTimed; ++k)
+      tbb::parallel_for(tbb::blocked_range<std::size_t>(0, size, 1 << 14), [&](const auto& range) {
+        for (std::size_t i = range.begin(); i < range.end(); ++i)
+          position[i] += rest[i], velocity[i] += lengths[i];
+      });
+    nanoseconds.push_back(1e9 * timer.seconds() * threads /
+                          (static_cast<double>(kTimed) * kStrands * kParticles));
+  }
+  return median(nanoseconds);
+}
+
 // A shaken wig, the head swinging 5 cm at 1 Hz: forces, factor, solve, advance and the length projection it
 // needs.
 Row strand_row(const std::string& instruction_set, int threads, int repeats) {
@@ -115,6 +139,7 @@ Row strand_row(const std::string& instruction_set, int threads, int repeats) {
           {"particles", kStrands * kParticles},
           {"projection_iterations", iterations / (static_cast<double>(kTimed) * kStrands)},
           {"ns_per_particle_substep_core", median(nanoseconds)},
+          {"floor_ns_per_particle_core", floor_nanoseconds(model, state, threads, repeats)},
           {"ms_per_substep", 1e-6 * median(nanoseconds) * kStrands * kParticles / threads}};
 }
 
@@ -158,11 +183,13 @@ void print_table(const std::vector<Row>& rows) {
              "ms", "ns/particle/substep/core", "");
   for (const Row& row : rows) {
     if (row.contains("ns_per_particle_substep_core")) {
-      fmt::print("{:<24} {:>8} {:>9} {:>8} {:>12.2f} {:>22.1f} {:>12}\n",
-                 row["row"].get<std::string>() + " " + row["instruction_set"].get<std::string>(),
-                 row["strands"].get<int>(), row["particles"].get<int>(), row["threads"].get<int>(),
-                 row["ms_per_substep"].get<double>(), row["ns_per_particle_substep_core"].get<double>(),
-                 fmt::format("{:.2f} projections", row["projection_iterations"].get<double>()));
+      fmt::print(
+          "{:<24} {:>8} {:>9} {:>8} {:>12.2f} {:>22.1f} {:>12}\n",
+          row["row"].get<std::string>() + " " + row["instruction_set"].get<std::string>(),
+          row["strands"].get<int>(), row["particles"].get<int>(), row["threads"].get<int>(),
+          row["ms_per_substep"].get<double>(), row["ns_per_particle_substep_core"].get<double>(),
+          fmt::format("{:.2f} projections, floor {:.1f} ns", row["projection_iterations"].get<double>(),
+                      row["floor_ns_per_particle_core"].get<double>()));
     } else {
       std::string stages;
       for (const auto& [name, ms] : row["stages_ms"].items())

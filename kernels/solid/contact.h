@@ -22,6 +22,10 @@ struct LaneFigures {
   int swept = 0;
 };
 
+// How deep a segment may dip into the solid between its particles, in voxels: hair that lies on a round head
+// is a polyline of chords. What is deeper is a thin part of the solid between two particles.
+inline constexpr float kChordVoxels = 0.25f;
+
 template <class T>
 struct StrandContact {
   const SolidView& solid;
@@ -57,9 +61,9 @@ struct StrandContact {
   RINGLET_FUNCTION SurfaceSample<T> sample(Vector3<T> x) const {
     return sample_surface(solid, local(x), skin);
   }
-  // The same where only what is well inside matters: outside the level set's word is enough.
+  // The same where only what is deeper than a chord's dip matters.
   RINGLET_FUNCTION SurfaceSample<T> sample_inside(Vector3<T> x) const {
-    return sample_surface(solid, local(x), skin, T(0));
+    return sample_surface(solid, local(x), skin, static_cast<T>(kNearVoxels - kChordVoxels) * voxel);
   }
   RINGLET_FUNCTION Vector3<T> world_normal(const SurfaceSample<T>& at) const {
     return rotate(solid.rotation, at.normal);
@@ -104,11 +108,11 @@ struct Entry {
   T left;        // share of the substep that was still to come
 };
 
-// Looks along the last `way` to p for the solid. Steps as long as the distances allow find what is half a
-// voxel thick or more.
+// Looks along the last `way` to p for the solid, in steps as long as the distances allow but no shorter than
+// half a voxel: thinner parts are found where a step ends in them. `ends_inside` tells of p.
 template <class T>
 RINGLET_FUNCTION Entry<T> find_entry(const StrandContact<T>& contact, Vector3<T> p, Vector3<T> way,
-                                     T distance) {
+                                     T distance, bool ends_inside) {
   constexpr int kMostProbes = 256, kHalvings = 6;
   const T least = max(T(0.5) * contact.voxel, distance / T(kMostProbes));
   const auto depth_after = [&](T gone) {
@@ -117,7 +121,11 @@ RINGLET_FUNCTION Entry<T> find_entry(const StrandContact<T>& contact, Vector3<T>
   T outside = T(0), inside = least;
   if (depth_after(T(0)) > T(0.25) * contact.voxel) return {};  // it was inside before
   for (;; inside = outside + least) {
-    if (!(inside < distance)) return {};
+    if (!(inside < distance)) {
+      if (!ends_inside) return {};
+      inside = distance;
+      break;
+    }
     const T depth = depth_after(inside);
     if (depth > T(0)) break;
     outside = max(inside, inside - depth - least);
@@ -137,9 +145,10 @@ RINGLET_FUNCTION Entry<T> hidden_entry(const StrandContact<T>& contact, Vector3<
   const Vector3<T> p = contact.local(x), way = contact.way(x, v, p, at.triangle);
   const T distance = length(way);
   if (distance > contact.band) ++figures.swept;
-  if (!(distance > max(T(0.5) * contact.voxel, at.distance))) return {};
-  if (at.distance < T(0) && at.exact && !(dot(way, at.normal) > T(0))) return {};
-  return find_entry(contact, p, way, distance);
+  const bool inside = at.distance < T(0) && at.exact;
+  const bool suspect = inside ? dot(way, at.normal) > T(0) && distance > -at.distance
+                              : distance > max(T(0.5) * contact.voxel, at.distance);
+  return suspect ? find_entry(contact, p, way, distance, inside) : Entry<T>{};
 }
 
 // The velocity and push-out stages for one particle; true where it touched. `clearance` becomes how far

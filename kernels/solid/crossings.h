@@ -17,15 +17,16 @@ RINGLET_FUNCTION T crossing_side(Vector3<T> a, Vector3<T> b) {
 }
 
 // 1 where the ray from the origin along +x leaves through the triangle, -1 where it enters, 0 where it
-// misses.
+// misses. A ray through an edge or a vertex counts as one moved by (e, e^2) in y and z, e as small as it
+// takes: every triangle about them agrees on it.
 template <class T>
-RINGLET_FUNCTION int crossing(Vector3<T> a, Vector3<T> b, Vector3<T> c, const std::int32_t* vertex) {
-  const auto positive = [](T side, std::int32_t from, std::int32_t to) {
-    return side > T(0) || (side == T(0) && from < to);  // a ray through an edge belongs to one side of it
+RINGLET_FUNCTION int crossing(Vector3<T> a, Vector3<T> b, Vector3<T> c) {
+  const auto positive = [](T side, Vector3<T> from, Vector3<T> to) {
+    if (side != T(0)) return side > T(0);
+    return from.z != to.z ? from.z > to.z : to.y > from.y;
   };
-  const bool ab = positive(crossing_side(a, b), vertex[0], vertex[1]),
-             bc = positive(crossing_side(b, c), vertex[1], vertex[2]),
-             ca = positive(crossing_side(c, a), vertex[2], vertex[0]);
+  const bool ab = positive(crossing_side(a, b), a, b), bc = positive(crossing_side(b, c), b, c),
+             ca = positive(crossing_side(c, a), c, a);
   if (ab != bc || bc != ca) return 0;
   const bool ahead = (dot(a, cross(b, c)) > T(0)) == ab;
   return !ahead ? 0 : ab ? 1 : -1;
@@ -35,9 +36,10 @@ RINGLET_FUNCTION int crossing(Vector3<T> a, Vector3<T> b, Vector3<T> c, const st
 template <class T>
 RINGLET_FUNCTION int winding_number(const SolidView& solid, Vector3<T> p) {
   const CrossingsView& bins = solid.crossings;
-  const T y = (p.y - static_cast<T>(bins.low[0])) * static_cast<T>(bins.per_metre),
-          z = (p.z - static_cast<T>(bins.low[1])) * static_cast<T>(bins.per_metre);
-  if (!(y >= T(0) && z >= T(0) && y < static_cast<T>(bins.count[0]) && z < static_cast<T>(bins.count[1])))
+  // In single precision, as the bins were made.
+  const float y = (static_cast<float>(p.y) - bins.low[0]) * bins.per_metre,
+              z = (static_cast<float>(p.z) - bins.low[1]) * bins.per_metre;
+  if (!(y >= 0 && z >= 0 && y < static_cast<float>(bins.count[0]) && z < static_cast<float>(bins.count[1])))
     return 0;
   const std::int32_t bin = static_cast<std::int32_t>(y) * bins.count[1] + static_cast<std::int32_t>(z);
   int sum = 0;
@@ -47,7 +49,7 @@ RINGLET_FUNCTION int winding_number(const SolidView& solid, Vector3<T> p) {
       const float* x = solid.vertices + 3 * static_cast<std::int64_t>(v[c]);
       return Vector3<T>{static_cast<T>(x[0]), static_cast<T>(x[1]), static_cast<T>(x[2])} - p;
     };
-    sum += crossing(corner(0), corner(1), corner(2), v);
+    sum += crossing(corner(0), corner(1), corner(2));
   }
   return sum;
 }

@@ -36,8 +36,7 @@ template <class T>
 struct LevelSetSample {
   T distance;  // [m], plus or minus the background beyond the band
   std::int32_t
-      triangle;   // closest to the voxel nearest to the point, deep inside one near by; -1 where unknown
-  bool enclosed;  // no voxel about the point is outside
+      triangle;  // closest to the voxel nearest to the point, deep inside one near by; -1 where unknown
 };
 
 // A value beyond this many voxels needs no interpolation: the surface is not in the cell.
@@ -53,28 +52,24 @@ RINGLET_FUNCTION LevelSetSample<T> sample_level_set(const LevelSetView& set, Vec
   const auto nearest = [](T a) { return floor_to_int(a + T(0.5)); };
   const std::int64_t centre = voxel_at(set, nearest(q.x), nearest(q.y), nearest(q.z));
   if (centre < 0) {
-    if (centre == kTileOutside) return {background, -1, false};
-    return {T(0) - background, static_cast<std::int32_t>(kTileInside - centre), true};
+    if (centre == kTileOutside) return {background, -1};
+    return {T(0) - background, static_cast<std::int32_t>(kTileInside - centre)};
   }
   const T value = static_cast<T>(set.distance[centre]);
   const std::int32_t triangle = set.triangle[centre];
-  if (abs(value) > static_cast<T>(kFarVoxels * set.voxel_size)) return {value, triangle, value < T(0)};
+  if (abs(value) > static_cast<T>(kFarVoxels * set.voxel_size)) return {value, triangle};
 
   const int x = floor_to_int(q.x), y = floor_to_int(q.y), z = floor_to_int(q.z);
   const T f[3] = {q.x - static_cast<T>(x), q.y - static_cast<T>(y), q.z - static_cast<T>(z)};
-  bool enclosed = true;
   const auto at = [&](int corner) {
     const std::int64_t voxel = voxel_at(set, x + (corner >> 2), y + (corner >> 1 & 1), z + (corner & 1));
-    const T found = voxel >= 0              ? static_cast<T>(set.distance[voxel])
-                    : voxel == kTileOutside ? background
-                                            : T(0) - background;
-    enclosed = enclosed && found < T(0);
-    return found;
+    if (voxel < 0) return voxel == kTileOutside ? background : T(0) - background;
+    return static_cast<T>(set.distance[voxel]);
   };
   const auto mix = [](T t, T a, T b) { return fma(t, b - a, a); };
   const T low = mix(f[1], mix(f[2], at(0), at(1)), mix(f[2], at(2), at(3)));
   const T high = mix(f[1], mix(f[2], at(4), at(5)), mix(f[2], at(6), at(7)));
-  return {mix(f[0], low, high), triangle, enclosed};
+  return {mix(f[0], low, high), triangle};
 }
 
 // To the box of all tiles [m]; 0 within. Nothing outside it is near the surface.

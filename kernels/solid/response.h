@@ -78,10 +78,6 @@ struct ContactPack {
   }
 };
 
-// How deep a segment may dip into the solid between its particles, in voxels: hair that lies on a round head
-// is a polyline of chords. What is deeper is a thin part of the solid between two particles.
-inline constexpr float kChordVoxels = 0.25f;
-
 // One lane's strand.
 template <class R>
 struct ContactLane {
@@ -144,8 +140,10 @@ struct ContactLane {
   RINGLET_FUNCTION void push(LaneFigures<T>& figures, bool segments) const {
     figures.pushed = T(0);
     for_each_solid([&](const StrandContact<T>& contact) {
-      for (int i = 0; i < count; ++i) clearance(i) = T(0) - contact.band;  // lengths have moved all
-      if (segments) push_segments(contact, figures);
+      if (segments) {
+        for (int i = 0; i < count; ++i) clearance(i) = T(0) - contact.band;  // lengths have moved all
+        push_segments(contact, figures);
+      }
       for (int i = first(); i < count; ++i) push_particle(contact, i, contact.sample(position(i)), figures);
     });
   }
@@ -162,7 +160,7 @@ struct ContactLane {
           const SurfaceSample<T> own =
               sample_sheet(contact.solid, contact.local(position(i)), contact.skin.triangle);
           contact.skin.triangle = own.triangle;
-          if (at.distance < T(0)) at = own;
+          if (at.distance + static_cast<T>(contact.solid.offset) < T(0)) at = own;
         }
         push_particle(contact, i, at, figures);
       }
@@ -335,17 +333,19 @@ struct PackContacts {
       if (better[l] > T(0) && figures[l].strain < before[l].strain) continue;
       better[l] = T(0), figures[l].strain = before[l].strain, figures[l].pushed = before[l].pushed;
     }
-    write_back(load<R>(better) > R(0));
+    // Velocities stay as they were: what brought a particle to its sheet is a correction, not a motion.
+    write_back(load<R>(better) > R(0), x, pack.position);
   }
 
   RINGLET_FUNCTION void write_back(Mask<R> chosen) {
+    write_back(chosen, x, pack.position);
+    write_back(chosen, v, pack.velocity);
+  }
+  RINGLET_FUNCTION void write_back(Mask<R> chosen, T* to, const T* from) {
     for (int i = 0; i < particles; ++i) {
-      const auto copy = [&](T* to, const T* from) {
-        to += 3 * i * kLanes;
-        store3<R>(to, kLanes,
-                  select(chosen, load3<R>(from + 3 * i * pack.stride, pack.stride), load3<R>(to, kLanes)));
-      };
-      copy(x, pack.position), copy(v, pack.velocity);
+      T* there = to + 3 * i * kLanes;
+      const Vector3<R> changed = load3<R>(from + 3 * i * pack.stride, pack.stride);
+      store3<R>(there, kLanes, select(chosen, changed, load3<R>(there, kLanes)));
     }
   }
 

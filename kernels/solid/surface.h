@@ -132,18 +132,13 @@ inline constexpr float kDoubtVoxels = 0.1f;
 template <class T>
 struct BlendedSample {
   LevelSetSample<T> first, second;
-  T distance;     // [m]
-  bool enclosed;  // no voxel about the point is outside
+  T distance;  // [m]
 
   RINGLET_FUNCTION BlendedSample(const SolidView& solid, Vector3<T> p)
-      : first(sample_level_set(solid.level_set[0], p)),
-        second(first),
-        distance(first.distance),
-        enclosed(first.enclosed) {
+      : first(sample_level_set(solid.level_set[0], p)), second(first), distance(first.distance) {
     if (!(solid.blend > 0.0f)) return;
     second = sample_level_set(solid.level_set[1], p);
     distance = fma(static_cast<T>(solid.blend), second.distance - first.distance, first.distance);
-    enclosed = enclosed && second.enclosed;
   }
 };
 
@@ -172,10 +167,10 @@ RINGLET_FUNCTION bool near_fold(const SolidView& solid, Vector3<T> p) {
 // Whether the triangle lies inside another part of the solid where it is closest to p.
 template <class T>
 RINGLET_FUNCTION bool is_covered(const SolidView& solid, std::int32_t triangle, Vector3<T> p) {
-  if (!near_fold(solid, p)) return false;
+  const Vector3<T> on_triangle = p - closest_on_triangle(solid, triangle, p).to_point;
+  if (!near_fold(solid, on_triangle)) return false;
   const T above = static_cast<T>(kAboveVoxels * solid.level_set[0].voxel_size);
-  return winding_number(solid, fma(above, unit_normal<T>(solid, triangle),
-                                   p - closest_on_triangle(solid, triangle, p).to_point)) != 0;
+  return winding_number(solid, fma(above, unit_normal<T>(solid, triangle), on_triangle)) != 0;
 }
 
 // `p` in level-set coordinates at the substep's end [m]. Where the level set puts the surface farther than
@@ -215,9 +210,16 @@ RINGLET_OUTLINED SurfaceSample<T> sample_surface(const SolidView& solid, Vector3
     on_sheet = own.distance2 <= best.distance2;
     if (on_sheet) best = own, told = side_of(solid, best);
   }
-  bool inside = on_sheet || level.enclosed || told.distance < T(0) ||
-                distance < T(0) - static_cast<T>(kNearVoxels) * voxel;
-  if (!inside && near_fold(solid, p)) on_sheet = inside = winding_number(solid, p) != 0;
+  // Farther from zero the level set knows the side; about folds rays do, else the closest triangle.
+  const T beyond_doubt = static_cast<T>(kNearVoxels) * voxel;
+  bool inside = distance < beyond_doubt && told.distance < T(0);
+  if (on_sheet || distance < T(0) - beyond_doubt) {
+    inside = true;
+  } else if (near_fold(solid, p)) {
+    const bool in_front = !inside;
+    inside = winding_number(solid, p) != 0;
+    on_sheet = inside && in_front;
+  }
   const T away = abs(told.distance);
   const bool touching = away < T(1e-7);  // [m] no direction of its own
   const T side = inside ? T(-1) : T(1);

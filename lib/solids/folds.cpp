@@ -92,52 +92,63 @@ void mark_pierced(const ClosedSurface& surface, std::span<const Vector3f> vertic
 
 }  // namespace
 
-void Crossings::build(std::span<const Vector3f> vertices, std::span<const Triangle> triangles) {
-  Eigen::AlignedBox2f box;
-  for (const Vector3f& v : vertices) box.extend(v.tail<2>());
-  // About as many bins as triangles: a ray meets few that it does not cross.
-  const float area = std::max(box.volume(), 1e-12f);
-  const float edge =
-      std::max(std::sqrt(area / static_cast<float>(std::max<std::size_t>(triangles.size(), 1))),
-               box.sizes().maxCoeff() / 1024);
+void Crossings::lay_out(const Eigen::AlignedBox2f& box, float edge) {
   view_.per_metre = 1 / edge;
   for (int axis = 0; axis < 2; ++axis) {
     view_.low[axis] = box.min()[axis];
     view_.count[axis] = static_cast<std::int32_t>(box.sizes()[axis] / edge) + 1;
   }
-  const auto for_each_bin_of = [&](const Triangle& t, const auto& visit) {
-    Eigen::AlignedBox3f bounds;
-    for (const std::int32_t v : t) bounds.extend(vertices[static_cast<std::size_t>(v)]);
-    for_each_bin(bounds, visit);
-  };
-  start_.assign(static_cast<std::size_t>(view_.count[0]) * static_cast<std::size_t>(view_.count[1]) + 1, 0);
-  for (const Triangle& t : triangles) for_each_bin_of(t, [&](std::size_t bin) { ++start_[bin + 1]; });
-  for (std::size_t bin = 1; bin < start_.size(); ++bin) start_[bin] += start_[bin - 1];
-  triangle_.resize(static_cast<std::size_t>(start_.back()));
-  std::vector<std::int32_t> next(start_.begin(), start_.end() - 1);
-  for (std::size_t t = 0; t < triangles.size(); ++t)
-    for_each_bin_of(triangles[t], [&](std::size_t bin) {
-      triangle_[static_cast<std::size_t>(next[bin]++)] = static_cast<std::int32_t>(t);
-    });
 }
 
-template <class Visit>
-void Crossings::for_each_bin(const Eigen::AlignedBox3f& box, const Visit& visit) const {
-  std::int32_t low[2], high[2];
+Crossings::Range Crossings::range_of(const Eigen::AlignedBox3f& box) const {
+  Range range;
   for (int axis = 0; axis < 2; ++axis) {
     const auto bin = [&](float x) {
       return std::clamp(static_cast<std::int32_t>((x - view_.low[axis]) * view_.per_metre), 0,
                         view_.count[axis] - 1);
     };
-    low[axis] = bin(box.min()[axis + 1]), high[axis] = bin(box.max()[axis + 1]);
+    range.low[axis] = bin(box.min()[axis + 1]), range.high[axis] = bin(box.max()[axis + 1]);
   }
-  for (std::int32_t y = low[0]; y <= high[0]; ++y)
-    for (std::int32_t z = low[1]; z <= high[1]; ++z) visit(static_cast<std::size_t>(y * view_.count[1] + z));
+  return range;
+}
+
+template <class Visit>
+void Crossings::for_each_bin(const Range& range, const Visit& visit) const {
+  for (std::int32_t y = range.low[0]; y <= range.high[0]; ++y)
+    for (std::int32_t z = range.low[1]; z <= range.high[1]; ++z)
+      visit(static_cast<std::size_t>(y * view_.count[1] + z));
+}
+
+void Crossings::build(std::span<const Vector3f> vertices, std::span<const Triangle> triangles) {
+  constexpr std::size_t kMostEntries = 32;  // for each triangle, on average: long slivers lie in many bins
+  Eigen::AlignedBox2f bounds;
+  for (const Vector3f& v : vertices) bounds.extend(v.tail<2>());
+  std::vector<Eigen::AlignedBox3f> boxes(triangles.size());
+  for (std::size_t t = 0; t < triangles.size(); ++t)
+    for (const std::int32_t v : triangles[t]) boxes[t].extend(vertices[static_cast<std::size_t>(v)]);
+  // About as many bins as triangles, so that a ray meets few that it does not cross.
+  const float area =
+      std::max(bounds.volume(), 1e-12f) / static_cast<float>(std::max<std::size_t>(boxes.size(), 1));
+  for (float edge = std::max(std::sqrt(area), bounds.sizes().maxCoeff() / 1024);; edge *= 2) {
+    lay_out(bounds, edge);
+    std::size_t entries = 0;
+    for (const auto& box : boxes) entries += range_of(box).size();
+    if (entries <= kMostEntries * boxes.size() || view_.count[0] * view_.count[1] == 1) break;
+  }
+  start_.assign(static_cast<std::size_t>(view_.count[0]) * static_cast<std::size_t>(view_.count[1]) + 1, 0);
+  for (const auto& box : boxes) for_each_bin(range_of(box), [&](std::size_t bin) { ++start_[bin + 1]; });
+  for (std::size_t bin = 1; bin < start_.size(); ++bin) start_[bin] += start_[bin - 1];
+  triangle_.resize(static_cast<std::size_t>(start_.back()));
+  std::vector<std::int32_t> next(start_.begin(), start_.end() - 1);
+  for (std::size_t t = 0; t < boxes.size(); ++t)
+    for_each_bin(range_of(boxes[t]), [&](std::size_t bin) {
+      triangle_[static_cast<std::size_t>(next[bin]++)] = static_cast<std::int32_t>(t);
+    });
 }
 
 void Crossings::for_each_near(const Vector3f& a, const Vector3f& b,
                               const std::function<void(std::int32_t)>& visit) const {
-  for_each_bin(Eigen::AlignedBox3f(a.cwiseMin(b), a.cwiseMax(b)), [&](std::size_t bin) {
+  for_each_bin(range_of({a.cwiseMin(b), a.cwiseMax(b)}), [&](std::size_t bin) {
     for (auto k = start_[bin]; k < start_[bin + 1]; ++k) visit(triangle_[static_cast<std::size_t>(k)]);
   });
 }

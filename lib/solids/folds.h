@@ -23,8 +23,16 @@ class Crossings {
   std::size_t bytes() const { return (start_.size() + triangle_.size()) * sizeof(std::int32_t); }
 
  private:
+  struct Range {  // of bins, inclusive
+    std::int32_t low[2], high[2];
+    std::size_t size() const {
+      return static_cast<std::size_t>(high[0] - low[0] + 1) * static_cast<std::size_t>(high[1] - low[1] + 1);
+    }
+  };
+  void lay_out(const Eigen::AlignedBox2f& box, float edge);
+  Range range_of(const Eigen::AlignedBox3f& box) const;
   template <class Visit>
-  void for_each_bin(const Eigen::AlignedBox3f& box, const Visit& visit) const;
+  void for_each_bin(const Range& range, const Visit& visit) const;
 
   kernels::CrossingsView view_{};
   std::vector<std::int32_t> start_, triangle_;

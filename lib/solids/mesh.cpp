@@ -116,6 +116,14 @@ struct AnimatedMesh::Impl {
 
   void sample(double time, std::span<Vec3> out) const { sample(time, presence(time), out); }
 
+  double duration() const {
+    double end = rig.has_clip ? rig.clip_length : 0;
+    if (!sequence.frames.empty())
+      end = std::max(end, seconds(static_cast<double>(sequence.frames.size()) - 1));
+    for (const scene::Key& key : animation.keys) end = std::max(end, seconds(key.frame - frames.first));
+    return end;
+  }
+
   // Every instant at which the motion may change its course, and the middles between.
   std::vector<double> telling_times() const {
     const double begin = -seconds(frames.preroll), end = seconds(frames.last - frames.first);
@@ -187,6 +195,8 @@ const std::vector<std::int32_t>& AnimatedMesh::mesh_of_triangle() const {
 const std::vector<std::string>& AnimatedMesh::mesh_names() const { return impl_->rig.mesh_names; }
 const std::vector<Vec3>& AnimatedMesh::rest_vertices() const { return impl_->rest; }
 AnimatedMesh::Motion AnimatedMesh::motion() const { return impl_->motion; }
+
+double AnimatedMesh::duration() const { return impl_->duration(); }
 Pose AnimatedMesh::pose(double time) const { return impl_->pose(time); }
 
 void AnimatedMesh::sample(double time, std::span<Vec3> out) const {

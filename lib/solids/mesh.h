@@ -33,6 +33,9 @@ class AnimatedMesh {
   enum class Motion { kStill, kRigid, kDeforming };
   Motion motion() const;
 
+  // How long it moves by itself [s]: to the last key, the clip's end or the sequence's, whichever comes last.
+  double duration() const;
+
   // Vertices at `time` [s] after frame `first`. Times before 0 are preroll: from the rest pose (at minus its
   // length) to the pose at 0. Deterministic; safe to call from several threads at once.
   void sample(double time, std::span<Vec3> out) const;

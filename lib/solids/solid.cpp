@@ -29,15 +29,15 @@ Eigen::AlignedBox3d bounds_of(const std::vector<Vec3>& vertices) {
   return box;
 }
 
-// Of a deforming mesh the longest of several instants: keys may scale it.
-double longest_side(const AnimatedMesh& mesh, double first_time, double last_time) {
+// Of a deforming mesh the longest of several instants, whatever part of its motion is run: keys may scale it.
+double longest_side(const AnimatedMesh& mesh) {
   double longest = bounds_of(mesh.rest_vertices()).sizes().maxCoeff();
   if (mesh.motion() != Motion::kDeforming) return longest;
   longest = 0;
   constexpr int kInstants = 9;
   std::vector<Vec3> vertices(mesh.vertex_count());
   for (int k = 0; k < kInstants; ++k) {
-    mesh.sample(first_time + (last_time - first_time) * k / (kInstants - 1), vertices);
+    mesh.sample(mesh.duration() * k / (kInstants - 1), vertices);
     longest = std::max(longest, bounds_of(vertices).sizes().maxCoeff());
   }
   return longest;
@@ -71,8 +71,8 @@ struct Solid::Impl {
         fps(run.fps),
         surface(close_surface(desc.name, collider.rest_vertices(), collider.triangles())) {
     origin = bounds_of(mesh.rest_vertices()).center();
-    options = {voxel_size(desc, longest_side(mesh, first_time, (run.last - run.first) / run.fps)),
-               desc.half_width, desc.level_set_cache.value_or(cache_directory), name};
+    options = {voxel_size(desc, longest_side(mesh)), desc.half_width,
+               desc.level_set_cache.value_or(cache_directory), name};
     view.friction = static_cast<float>(desc.friction);
     view.offset = static_cast<float>(desc.offset);
     view.triangles = surface.triangles.front().data();

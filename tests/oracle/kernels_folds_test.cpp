@@ -83,6 +83,22 @@ TYPED_TEST(KernelFolds, WindingNumbersAreTheSolidAngles) {
   for (const int count : counts) EXPECT_GT(count, 50) << "points outside, in one ball, in both";
 }
 
+// Through each vertex of a ball, from within and from without.
+TYPED_TEST(KernelFolds, RaysThroughVerticesCountOnce) {
+  const FoldedSolid ball(icosphere(0.05, 2), 0.02);
+  int inside = 0;
+  for (const Vector3d& v : ball.mesh.surface.vertices) {
+    const double reach = std::sqrt(std::max(0.0, 0.0025 - v.y() * v.y() - v.z() * v.z()));
+    for (const double x : {-0.2, 0.2, 0.0}) {
+      if (x == 0 && reach < 0.02) continue;
+      ASSERT_EQ(kernels::winding_number(ball.view(), this->at({x, v.y(), v.z()})), x == 0 ? 1 : 0)
+          << v.transpose();
+      inside += x == 0;
+    }
+  }
+  EXPECT_GT(inside, 50);
+}
+
 // Turned inside out, it winds the other way; along edges and through vertices rays count once.
 TYPED_TEST(KernelFolds, RaysThroughEdgesAndVerticesCountOnce) {
   Surface cube = box({-0.05, -0.05, -0.05}, {0.05, 0.05, 0.05}, 4);
@@ -136,7 +152,7 @@ class KernelFold : public OnMachine<Machine> {};
 TYPED_TEST_SUITE(KernelFold, Machines, MachineNames);
 
 // Strands of 2 cm grow all over the first ball, straight out. Those that the second covers end on a surface,
-// whichever, at their lengths; without their skin they could not.
+// whichever, at their lengths.
 TYPED_TEST(KernelFold, CoveredStrandsComeToLieOnASurfaceAtTheirLengths) {
   using T = typename TypeParam::T;
   const Surface& surface = balls().mesh.surface;

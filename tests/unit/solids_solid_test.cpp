@@ -120,6 +120,8 @@ TEST_F(SolidTest, VoxelsMeasureTheMeshAsItMoves) {
   const AnimatedMesh mesh = growing();
   Solid solid(solid_desc(40), mesh, {1, 5, 24, 0}, 0, {});
   EXPECT_NEAR(solid.at(0, 0.01).level_set[0].voxel_size, 0.4 / 40, 1e-4);
+  Solid prolonged(solid_desc(40), mesh, {1, 500, 24, 12}, -0.5, {});
+  EXPECT_EQ(prolonged.at(0, 0.01).level_set[0].voxel_size, solid.at(0, 0.01).level_set[0].voxel_size);
 }
 
 TEST_F(SolidTest, GivenVoxelCountsAndFlatSurfacesAreAllowed) {

@@ -221,7 +221,7 @@ RINGLET_OUTLINED SurfaceSample<T> sample_surface(const SolidView& solid, Vector3
     on_sheet = inside && in_front;
   }
   const T away = abs(told.distance);
-  const bool touching = away < T(1e-7);  // [m] no direction of its own
+  const bool touching = away < T(1e-6);  // [m] the way to it is rounding
   const T side = inside ? T(-1) : T(1);
   const Vector3<T> towards = touching ? told.outward : side * best.to_point;
   sample.exact = true;
@@ -245,7 +245,7 @@ RINGLET_FUNCTION SurfaceSample<T> sample_sheet(const SolidView& solid, Vector3<T
   ClosestPoint<T> own = closest_on_triangle(solid, triangle, p);
   walk(solid, p, own);
   const T away = sqrt(own.distance2);
-  const Vector3<T> towards = away < T(1e-7) ? outward(solid, own) : T(-1) * own.to_point;
+  const Vector3<T> towards = away < T(1e-6) ? outward(solid, own) : T(-1) * own.to_point;
   return {T(0) - away, true, inverse_or_zero(length(towards), shortest_direction<T>()) * towards,
           own.triangle, own.barycentric};
 }

@@ -159,7 +159,9 @@ TYPED_TEST(KernelResponse, StopsAtPlatesAsThinAsHalfAVoxel) {
         EXPECT_TRUE(after.position.y() >= -1e-6)
             << "from " << start << " by " << way << ": " << after.position.y();
         if (way > start + 1e-6) {
-          EXPECT_TRUE(std::abs(after.velocity.y()) <= 2e-3 * speed) << after.velocity.y();
+          EXPECT_TRUE(std::abs(after.velocity.y()) <= 2e-3 * speed)
+              << "from " << start << " by " << way << ": " << after.velocity.y() << " m/s at "
+              << after.position.y();
           EXPECT_NEAR(after.position.x(), 0.01 + kStep, 1e-4) << "it slides on for the rest of its time";
         }
       }

@@ -158,14 +158,15 @@ void add_bench(CLI::App& app, Job& job) {
   command->callback([options, &job] { job = [options] { return run_bench(*options); }; });
 }
 
-// The first word of the command line where it should be a subcommand and is none; else empty.
+// The word of the command line that should be a subcommand and is none; else empty.
 std::string unknown_subcommand(const CLI::App& app, int argc, char** argv) {
-  for (int i = 1; i < argc; ++i) {
+  const CLI::App* at = &app;
+  for (int i = 1; i < argc && !at->get_subcommands({}).empty(); ++i) {
     const std::string word = argv[i];
     if (word.starts_with('-')) continue;
-    const bool known =
-        !app.get_subcommands([&](const CLI::App* one) { return one->check_name(word); }).empty();
-    return known ? std::string() : word;
+    const auto named = at->get_subcommands([&](const CLI::App* one) { return one->check_name(word); });
+    if (named.empty()) return word;
+    at = named.front();
   }
   return {};
 }

@@ -8,8 +8,14 @@
 namespace ringlet::kernels {
 inline namespace RINGLET_ISA {
 
-// Twice the signed area of p, a, b in the yz plane; rounding changes sign with the order of a and b, so that
-// of two triangles that share an edge a ray crosses just one.
+template <class T>
+RINGLET_FUNCTION Vector3<T> corner(const float* vertices, std::int32_t vertex) {
+  const float* v = vertices + 3 * static_cast<std::int64_t>(vertex);
+  return {static_cast<T>(v[0]), static_cast<T>(v[1]), static_cast<T>(v[2])};
+}
+
+// Twice the signed area of the origin, a, b in the yz plane; rounding changes sign with the order of a and b,
+// so that of two triangles that share an edge a ray crosses just one.
 template <class T>
 RINGLET_FUNCTION T crossing_side(Vector3<T> a, Vector3<T> b) {
   const T left = a.y * b.z, right = a.z * b.y;
@@ -45,11 +51,8 @@ RINGLET_FUNCTION int winding_number(const SolidView& solid, Vector3<T> p) {
   int sum = 0;
   for (std::int32_t k = bins.start[bin]; k < bins.start[bin + 1]; ++k) {
     const std::int32_t* v = solid.triangles + 3 * static_cast<std::int64_t>(bins.triangle[k]);
-    const auto corner = [&](int c) {
-      const float* x = solid.vertices + 3 * static_cast<std::int64_t>(v[c]);
-      return Vector3<T>{static_cast<T>(x[0]), static_cast<T>(x[1]), static_cast<T>(x[2])} - p;
-    };
-    sum += crossing(corner(0), corner(1), corner(2));
+    const auto from_p = [&](int c) { return corner<T>(solid.vertices, v[c]) - p; };
+    sum += crossing(from_p(0), from_p(1), from_p(2));
   }
   return sum;
 }

@@ -22,12 +22,6 @@ struct SurfaceSample {
 };
 
 template <class T>
-RINGLET_FUNCTION Vector3<T> corner(const float* vertices, std::int32_t vertex) {
-  const float* v = vertices + 3 * static_cast<std::int64_t>(vertex);
-  return {static_cast<T>(v[0]), static_cast<T>(v[1]), static_cast<T>(v[2])};
-}
-
-template <class T>
 struct ClosestPoint {
   T distance2;
   Vector3<T> to_point;  // from the closest point
@@ -122,7 +116,8 @@ RINGLET_FUNCTION Side<T> side_of(const SolidView& solid, const ClosestPoint<T>& 
 // How near the level set must say the surface is for the exact mesh to be asked, in voxels. Its samples are
 // exact; where the surface lies between a point and a corner of its cell, that corner's distance is no more
 // than the corner is away, and the trilinear mean of these ways is at most half a cell's diagonal. Beyond it
-// the level set knows the side, however thin the solid.
+// a level set knows the side, however thin the solid; one blended from two frames may miss a thin part that
+// moves by more than its thickness in between.
 inline constexpr float kNearVoxels = 0.867f;
 
 // By how much the exact distance may differ from the level set's before it is doubted, in voxels.
@@ -173,6 +168,17 @@ RINGLET_FUNCTION bool is_covered(const SolidView& solid, std::int32_t triangle, 
   return winding_number(solid, fma(above, unit_normal<T>(solid, triangle), on_triangle)) != 0;
 }
 
+// The sample at a closest point, `offset` [m] outside it.
+template <class T>
+RINGLET_FUNCTION SurfaceSample<T> sample_at(const ClosestPoint<T>& at, Vector3<T> outward, bool inside,
+                                            T offset) {
+  const T away = sqrt(at.distance2), side = inside ? T(-1) : T(1);
+  const bool touching = away < T(1e-6);  // [m] the way to it is rounding
+  const Vector3<T> towards = touching ? outward : side * at.to_point;
+  return {fma(side, away, T(0) - offset), true,
+          inverse_or_zero(length(towards), shortest_direction<T>()) * towards, at.triangle, at.barycentric};
+}
+
 // `p` in level-set coordinates at the substep's end [m]. Where the level set puts the surface farther than
 // `near` [m] only the distance is given. The level set knows the surface that can be reached from without; a
 // covered patch is surface too, and both of its sides are inside.
@@ -182,15 +188,15 @@ RINGLET_OUTLINED SurfaceSample<T> sample_surface(const SolidView& solid, Vector3
   const BlendedSample<T> level(solid, p);
   const LevelSetSample<T>&first = level.first, &second = level.second;
   const T distance = level.distance;
-  SurfaceSample<T> sample{distance - static_cast<T>(solid.offset), false, zero3<T>(), -1, zero3<T>()};
-  const T voxel = static_cast<T>(solid.level_set[0].voxel_size);
-  if (sample.distance > near) return sample;
+  const T offset = static_cast<T>(solid.offset), voxel = static_cast<T>(solid.level_set[0].voxel_size);
+  const SurfaceSample<T> far_away{distance - offset, false, zero3<T>(), -1, zero3<T>()};
+  if (far_away.distance > near) return far_away;
 
   ClosestPoint<T> best{T(1e30), zero3<T>(), zero3<T>(), -1};
   consider(solid, first.triangle, p, best);
   consider(solid, second.triangle, p, best);
   consider(solid, skin.triangle, p, best);
-  if (best.triangle < 0) return sample;
+  if (best.triangle < 0) return far_away;
   walk(solid, p, best);
   // The walk can end where another part of the surface is closer still. Then it disagrees with the level set:
   // ask the triangles of the whole cell.
@@ -220,16 +226,7 @@ RINGLET_OUTLINED SurfaceSample<T> sample_surface(const SolidView& solid, Vector3
     inside = winding_number(solid, p) != 0;
     on_sheet = inside && in_front;
   }
-  const T away = abs(told.distance);
-  const bool touching = away < T(1e-6);  // [m] the way to it is rounding
-  const T side = inside ? T(-1) : T(1);
-  const Vector3<T> towards = touching ? told.outward : side * best.to_point;
-  sample.exact = true;
-  sample.distance = side * away - (on_sheet ? T(0) : static_cast<T>(solid.offset));
-  sample.normal = inverse_or_zero(length(towards), shortest_direction<T>()) * towards;
-  sample.triangle = best.triangle;
-  sample.barycentric = best.barycentric;
-  return sample;
+  return sample_at(best, told.outward, inside, on_sheet ? T(0) : offset);
 }
 
 template <class T>
@@ -244,10 +241,7 @@ template <class T>
 RINGLET_FUNCTION SurfaceSample<T> sample_sheet(const SolidView& solid, Vector3<T> p, std::int32_t triangle) {
   ClosestPoint<T> own = closest_on_triangle(solid, triangle, p);
   walk(solid, p, own);
-  const T away = sqrt(own.distance2);
-  const Vector3<T> towards = away < T(1e-6) ? outward(solid, own) : T(-1) * own.to_point;
-  return {T(0) - away, true, inverse_or_zero(length(towards), shortest_direction<T>()) * towards,
-          own.triangle, own.barycentric};
+  return sample_at(own, outward(solid, own), true, T(0));
 }
 
 // World from level-set axes and back.

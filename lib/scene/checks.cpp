@@ -100,6 +100,8 @@ class Checks {
     const std::string attach = groom["attach"];
     if (!has_head() && !grow && attach != "fixed")
       add(pointer + "/attach", brief(attach) + " without a head", "a head in the scene, or \"fixed\"");
+    if (attach == "fixed" && groom["root_offset"] == "snap")
+      add(pointer + "/root_offset", "\"snap\" of a fixed groom", "\"keep\", or roots held by the head");
     if (attach != "fixed" && !groom["animation"]["keys"].empty())
       add(pointer + "/animation", "keys", "none with attach " + brief(attach),
           "only a fixed groom has its own motion");

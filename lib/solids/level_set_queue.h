@@ -17,7 +17,7 @@ struct FrameSurface {
   std::shared_ptr<const LevelSet> level_set;
   std::vector<std::int32_t> folded;  // folded_triangles
 
-  std::size_t bytes() const { return level_set->bytes(); }
+  std::size_t bytes() const { return level_set->bytes() + folded.size() * sizeof folded[0]; }
 };
 
 class LevelSetQueue {

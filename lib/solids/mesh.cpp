@@ -195,7 +195,6 @@ const std::vector<std::int32_t>& AnimatedMesh::mesh_of_triangle() const {
 const std::vector<std::string>& AnimatedMesh::mesh_names() const { return impl_->rig.mesh_names; }
 const std::vector<Vec3>& AnimatedMesh::rest_vertices() const { return impl_->rest; }
 AnimatedMesh::Motion AnimatedMesh::motion() const { return impl_->motion; }
-
 double AnimatedMesh::duration() const { return impl_->duration(); }
 Pose AnimatedMesh::pose(double time) const { return impl_->pose(time); }
 

@@ -31,10 +31,9 @@ Eigen::AlignedBox3d bounds_of(const std::vector<Vec3>& vertices) {
 
 // Of a deforming mesh the longest of several instants, whatever part of its motion is run: keys may scale it.
 double longest_side(const AnimatedMesh& mesh) {
-  double longest = bounds_of(mesh.rest_vertices()).sizes().maxCoeff();
-  if (mesh.motion() != Motion::kDeforming) return longest;
-  longest = 0;
+  if (mesh.motion() != Motion::kDeforming) return bounds_of(mesh.rest_vertices()).sizes().maxCoeff();
   constexpr int kInstants = 9;
+  double longest = 0;
   std::vector<Vec3> vertices(mesh.vertex_count());
   for (int k = 0; k < kInstants; ++k) {
     mesh.sample(mesh.duration() * k / (kInstants - 1), vertices);
@@ -115,7 +114,13 @@ struct Solid::Impl {
     return {cached_level_set(surface, now, options), folded_triangles(surface, now, options.voxel_size)};
   }
 
-  // For the vertices now, where the surface passes through itself at either frame.
+  // Of the pair's frames.
+  void join_folds() {
+    folded.clear();
+    std::ranges::set_union(pair.before.folded, pair.after.folded, std::back_inserter(folded));
+  }
+
+  // For the vertices now, where closest triangles do not tell the side (folds.h).
   void find_folds() {
     view.crossings = {}, view.folded_tiles = nullptr;
     if (folded.empty()) return;
@@ -134,6 +139,7 @@ struct Solid::Impl {
                          pair.before.level_set->distance.size() / 512, options.voxel_size,
                          1e-6 * pair.before.bytes(), timer.seconds()));
     warn_if_empty(*pair.before.level_set);
+    join_folds();
     show(pair, 0);
     find_folds();
     view.vertices_before = view.vertices = vertices.front().data();
@@ -163,7 +169,7 @@ struct Solid::Impl {
 
   void place_deforming(double time_before, double time) {
     const int now = frame_of(time_before);
-    if (!frame || *frame != now) pair = queue->at(now);
+    if (!frame || *frame != now) pair = queue->at(now), join_folds();
     frame = now;
     show(pair, std::clamp(time * fps - now, 0.0, 1.0));
     if (!vertices_time || *vertices_time != time_before) vertices = local_at(time_before);
@@ -181,8 +187,6 @@ struct Solid::Impl {
     view.level_set[0] = level_sets.before.level_set->view();
     view.level_set[1] = level_sets.after.level_set->view();
     view.blend = static_cast<float>(blend);
-    folded.clear();
-    std::ranges::set_union(level_sets.before.folded, level_sets.after.folded, std::back_inserter(folded));
   }
 
   std::size_t bytes() const {

@@ -125,6 +125,8 @@ constexpr Case kMeaningCases[] = {
     {R"({"groom": {"file": null}})", "scene#/groom: found neither file nor grow, expected one of them"},
     {R"({"head": {"mesh": "head.obj"}, "groom": {"grow": {"strands": 9}}})",
      "scene#/groom: found both file and grow, expected one of them"},
+    {R"({"groom": {"root_offset": "snap"}})",
+     R"(scene#/groom/root_offset: found "snap" of a fixed groom, expected "keep", or roots held by the head)"},
     {R"({"groom": {"attach": "nearest"}})",
      R"(scene#/groom/attach: found "nearest" without a head, expected a head in the scene, or "fixed")"},
     {R"({"groom": {"file": null, "grow": {"strands": 9}}})",

@@ -316,9 +316,10 @@ def test_quiet_says_nothing(program, scene, tmp_path, place):
     assert f"frame {LAST}/{LAST}" in asked.stdout + asked.stderr
 
 
-def test_a_mistyped_subcommand_is_named(program):
-    result = run(program, "rum", "scene.json")
-    assert result.returncode == 2 and "`rum` is no subcommand" in result.stderr
+@pytest.mark.parametrize("arguments, word", [(["rum", "scene.json"], "rum"), (["groom", "gruw", "a.hair"], "gruw")])
+def test_a_mistyped_subcommand_is_named(program, arguments, word):
+    result = run(program, *arguments)
+    assert result.returncode == 2 and f"`{word}` is no subcommand" in result.stderr
 
 
 def test_what_is_no_file_is_not_called_missing(program):

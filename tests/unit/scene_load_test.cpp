@@ -110,7 +110,7 @@ TEST_F(SceneLoad, ReadsGrooms) {
   EXPECT_EQ(s.grooms[0].file, folder_ / "a.hair");
   EXPECT_THAT(s.grooms[0].more, testing::ElementsAre(folder_ / "b.hair"));
   EXPECT_EQ(s.grooms[0].attach, Attach::kNearest);
-  EXPECT_EQ(s.grooms[0].root_offset, RootOffset::kSnap);
+  EXPECT_EQ(s.grooms[2].root_offset, RootOffset::kSnap);
   EXPECT_EQ(s.grooms[0].penetration, Penetration::kKeep);
   ASSERT_EQ(s.grooms[0].stiffness.size(), 1u);
   EXPECT_EQ(s.grooms[0].stiffness[0].group, "a");

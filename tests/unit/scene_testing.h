@@ -77,8 +77,7 @@ class SceneTest : public testing::Test {
         }
       },
       "groom": [
-        {"file": ["a.hair", "b.hair"], "attach": "nearest", "attach_distance": 3,
-         "root_offset": "snap", "penetration": "keep",
+        {"file": ["a.hair", "b.hair"], "attach": "nearest", "attach_distance": 3, "penetration": "keep",
          "units": {"length": 0.5, "up": "x"}, "width": 0.01,
          "stiffness": [{"group": "a", "coupling": "edge", "curve": [[0, 1], [0.5, 0.25]]}]},
         {"name": "skin", "file": "c.tfx", "skin": "c.tfxskin", "attach": "fixed",
@@ -88,7 +87,8 @@ class SceneTest : public testing::Test {
           "scalp": {"mesh": "scalp", "box": [[0, 1, 2], [3, 4, 5]], "direction": [0, 0, 2], "max_angle_degrees": 60},
           "strands_per_triangle": 3, "strands": 0, "seed": 7, "particles": 12, "step": 0.5, "length_variation": 0.25,
           "direction_noise": 0.5, "gravity_influence": 0.03, "max_deviation": 0.3, "helix_radius": 5,
-          "helix_frequency": 2, "helix_impact": 0.02, "width": 0.02}}
+          "helix_frequency": 2, "helix_impact": 0.02, "width": 0.02},
+         "root_offset": "snap"}
       ],
       "model": {
         "type": "ams", "scheme": "projected",

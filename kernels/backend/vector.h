@@ -91,6 +91,9 @@ struct Symmetric3 {
     xx = fma(b.x, a.x, xx), xy = fma(b.x, a.y, xy), xz = fma(b.x, a.z, xz);
     yy = fma(b.y, a.y, yy), yz = fma(b.y, a.z, yz), zz = fma(b.z, a.z, zz);
   }
+  RINGLET_KERNEL void scale(R s) {
+    xx = s * xx, xy = s * xy, xz = s * xz, yy = s * yy, yz = s * yz, zz = s * zz;
+  }
   RINGLET_KERNEL void add_identity(R s) { xx = xx + s, yy = yy + s, zz = zz + s; }
   RINGLET_KERNEL void add(const Symmetric3& o) {
     xx = xx + o.xx, xy = xy + o.xy, xz = xz + o.xz, yy = yy + o.yy, yz = yz + o.yz, zz = zz + o.zz;

@@ -4,6 +4,8 @@
 #include "kernels/launch/launch.h"
 #include "kernels/solid/response.h"
 #include "kernels/strand/strand_step.h"
+#include "kernels/wind/shelter.h"
+#include "kernels/wind/wind_step.h"
 
 namespace ringlet::kernels {
 inline namespace RINGLET_ISA {
@@ -12,8 +14,11 @@ namespace {
 template <class R>
 void strand_step(const StrandStep<Scalar<R>>& step, int begin, int end, Scalar<R>* scratch) {
   constexpr int kWidth = Traits<R>::kWidth;
-  for (int batch = begin; batch < end; ++batch)
-    for (int lane = 0; lane < kLanes; lane += kWidth) step_strands<R>(step, batch, lane, scratch, kWidth);
+  with_extras(step, [&](auto extra) {
+    for (int batch = begin; batch < end; ++batch)
+      for (int lane = 0; lane < kLanes; lane += kWidth)
+        step_strands<decltype(extra), R>(step, batch, lane, scratch, kWidth);
+  });
 }
 
 template <class R>
@@ -23,12 +28,26 @@ void contact_step(const ContactStep<Scalar<R>>& step, int begin, int end, Scalar
     for (int lane = 0; lane < kLanes; lane += kWidth) collide_strands<R>(step, batch, lane, scratch, kWidth);
 }
 
+template <class R>
+void wind_step(const WindStep<Scalar<R>>& step, int begin, int end, Scalar<R>*) {
+  for (int batch = begin; batch < end; ++batch)
+    for (int lane = 0; lane < kLanes; lane += Traits<R>::kWidth) blow<R>(step, batch, lane);
+}
+
+template <class T>
+void shelter_step(const ShelterStep<T>& step, int begin, int end, T*) {
+  for (int batch = begin; batch < end; ++batch)
+    for (int lane = 0; lane < kLanes; ++lane) shelter_strand(step, batch, lane);
+}
+
 }  // namespace
 
 extern const KernelTable<float> float_kernels;
 extern const KernelTable<double> double_kernels;
-const KernelTable<float> float_kernels = {strand_step<FloatPack>, contact_step<FloatPack>};
-const KernelTable<double> double_kernels = {strand_step<DoublePack>, contact_step<DoublePack>};
+const KernelTable<float> float_kernels = {strand_step<FloatPack>, contact_step<FloatPack>,
+                                          wind_step<FloatPack>, shelter_step<float>};
+const KernelTable<double> double_kernels = {strand_step<DoublePack>, contact_step<DoublePack>,
+                                            wind_step<DoublePack>, shelter_step<double>};
 
 }  // namespace RINGLET_ISA
 }  // namespace ringlet::kernels

@@ -49,6 +49,8 @@ class Strands final : public CudaStrands {
     scratch_begin_.upload(begin, stream_.get());
     scratch_.resize(std::size_t(begin.back()) * kScratchReals * kWarp);
     skin_.upload(std::vector<std::int32_t>(lanes, kNoSkin), stream_.get());
+    if (model.per_length) per_length_.upload(array(model.per_length, lanes), stream_.get());
+    rows_ = rows;
     position_.resize(rows * 3 * kLanes), velocity_.resize(rows * 3 * kLanes);
     root_motion_.resize(lanes * kRootValues), root_points_.resize(lanes * 3);
     strand_figures_.resize(lanes * kFigures), contact_figures_.resize(lanes * kContactFigures);
@@ -57,11 +59,14 @@ class Strands final : public CudaStrands {
     stream_.synchronize();
   }
 
-  void upload_state(std::span<const float> position, std::span<const float> velocity) override {
-    send("position", position, position_), send("velocity", velocity, velocity_);
+  void upload_state(const StateArrays<const float>& host) override {
+    if (elongation_.size() != host.elongation.size()) elongation_.resize(host.elongation.size());
+    send("position", host.position, position_), send("velocity", host.velocity, velocity_);
+    send("elongation", host.elongation, elongation_);
   }
-  void download_state(std::span<float> position, std::span<float> velocity) override {
-    fetch("position", position_, position), fetch("velocity", velocity_, velocity);
+  void download_state(const StateArrays<float>& host) override {
+    fetch("position", position_, host.position), fetch("velocity", velocity_, host.velocity);
+    fetch("elongation", elongation_, host.elongation);
     stream_.synchronize();
   }
   void upload_roots(std::span<const float> motion, std::span<const double> points) override {
@@ -72,9 +77,34 @@ class Strands final : public CudaStrands {
     solids_.upload(solids, interval, stream_.get());
   }
 
-  void strand_step(const StrandParameters<float>& parameters) override {
-    const StrandStep<float> step{batches(), state(), root_motion_.data(), parameters, strand_figures_.data()};
-    stream_.parallel_for("strand step", threads(), StrandStepThread{step, scratch()});
+  void strand_step(const StrandStep<float>& host) override {
+    StrandStep<float> step = host;
+    step.batches = batches(), step.state = state(), step.roots = root_motion_.data();
+    step.figures = strand_figures_.data();
+    if (host.elongation.memory) step.elongation.memory = elongation_.data();
+    if (host.air.velocity) step.air.velocity = air_.data();
+    with_extras(step, [&](auto extra) {
+      stream_.parallel_for("strand step", threads(), StrandStepThread<decltype(extra)>{step, scratch()});
+    });
+  }
+  void wind_step(const WindStep<float>& host) override {
+    if (air_.size() == 0) air_.resize(rows_ * 3 * kLanes), clear(air_);
+    WindStep<float> step = host;
+    step.batches = batches(), step.position = position_.data(), step.root_points = root_points_.data();
+    if (host.exposure) step.exposure = exposure_.data();
+    step.air = air_.data();
+    stream_.parallel_for("wind step", threads(), WindStepThread{step});
+  }
+  void shelter_step(const ShelterStep<float>& host) override {
+    if (exposure_.size() == 0) exposure_.resize(rows_ * kLanes), clear(exposure_);
+    const std::int64_t cells = std::int64_t{host.map.columns} * host.map.rows;
+    front_.upload(array(host.map.front, cells), stream_.get());
+    rear_.upload(array(host.map.rear, cells), stream_.get());
+    ShelterStep<float> step = host;
+    step.batches = batches(), step.position = position_.data(), step.root_points = root_points_.data();
+    step.map.front = front_.data(), step.map.rear = rear_.data();
+    step.exposure = exposure_.data();
+    stream_.parallel_for("shelter step", threads(), ShelterStepThread{step});
   }
   void contact_step(const ContactParameters& p) override {
     const ContactStep<float> step{batches(),
@@ -105,7 +135,8 @@ class Strands final : public CudaStrands {
   std::vector<CudaLaunches> launches() override { return stream_.launches(); }
   std::size_t bytes() const override {
     return row_.bytes() + count_.bytes() + rest_.bytes() + rest_length_.bytes() + stiffness_.bytes() +
-           preload_.bytes() + position_.bytes() + velocity_.bytes() + root_motion_.bytes() +
+           preload_.bytes() + per_length_.bytes() + elongation_.bytes() + air_.bytes() + exposure_.bytes() +
+           front_.bytes() + rear_.bytes() + position_.bytes() + velocity_.bytes() + root_motion_.bytes() +
            root_points_.bytes() + skin_.bytes() + strand_figures_.bytes() + contact_figures_.bytes() +
            scratch_begin_.bytes() + scratch_.bytes() + solids_.bytes();
   }
@@ -113,8 +144,8 @@ class Strands final : public CudaStrands {
  private:
   int threads() const { return batches_ * kLanes; }
   StrandBatches<float> batches() const {
-    return {batches_,          row_.data(),    count_.data(), rest_.data(), rest_length_.data(),
-            stiffness_.data(), preload_.data()};
+    return {batches_,          row_.data(),     count_.data(),     rest_.data(), rest_length_.data(),
+            stiffness_.data(), preload_.data(), per_length_.data()};
   }
   StrandState<float> state() const { return {position_.data(), velocity_.data()}; }
   WarpScratch scratch() const { return {scratch_begin_.data(), scratch_.data()}; }
@@ -142,8 +173,10 @@ class Strands final : public CudaStrands {
   CudaStream stream_;
   std::int32_t batches_;
   DeviceBuffer<std::int32_t> row_;
-  DeviceBuffer<float> count_, rest_, rest_length_, stiffness_, preload_;
-  DeviceBuffer<float> position_, velocity_, root_motion_;
+  std::int64_t rows_ = 0;
+  DeviceBuffer<float> count_, rest_, rest_length_, stiffness_, preload_, per_length_;
+  DeviceBuffer<float> position_, velocity_, elongation_, root_motion_;
+  DeviceBuffer<float> air_, exposure_, front_, rear_;
   DeviceBuffer<std::int32_t> skin_;
   DeviceBuffer<double> root_points_;
   DeviceBuffer<float> strand_figures_, contact_figures_;

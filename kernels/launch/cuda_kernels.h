@@ -12,6 +12,8 @@
 
 #include "kernels/solid/solid_view.h"
 #include "kernels/strand/strand_batch.h"
+#include "kernels/wind/shelter.h"
+#include "kernels/wind/wind_step.h"
 
 namespace ringlet::kernels {
 
@@ -55,6 +57,14 @@ struct ContactParameters {
   std::int32_t home;  // see ContactStep
 };
 
+// The host's arrays of a state (StrandState). One that the run does without is empty; which ones are there
+// never changes.
+template <class T>
+struct StateArrays {
+  std::span<T> position, velocity;
+  std::span<T> elongation;  // [rows] Elongation::memory
+};
+
 // The strands of a run on the device. Arrays are laid out as on the host (StrandBatches, StrandState,
 // ContactStep), and every upload is done with the host's memory when it returns. Steps are queued on one
 // stream and run on their own; downloads wait for what was queued before. Any call may throw CudaError, also
@@ -63,13 +73,18 @@ class CudaStrands {
  public:
   virtual ~CudaStrands() = default;
 
-  virtual void upload_state(std::span<const float> position, std::span<const float> velocity) = 0;
-  virtual void download_state(std::span<float> position, std::span<float> velocity) = 0;
+  virtual void upload_state(const StateArrays<const float>& state) = 0;
+  virtual void download_state(const StateArrays<float>& state) = 0;
 
   // The root frames' motion over the next substep, [batches][kRootValues], and the root points at its end in
   // the world [batches][3] [m], which only contact_step reads.
   virtual void upload_roots(std::span<const float> motion, std::span<const double> points) = 0;
-  virtual void strand_step(const StrandParameters<float>& parameters) = 0;
+  // The steps' pointers are the host's: each stands for the device's own array, null for none.
+  virtual void strand_step(const StrandStep<float>& step) = 0;
+  // Where the air is and how much of it reaches each segment, for the strand steps from here on. The map's
+  // pointers are read.
+  virtual void wind_step(const WindStep<float>& step) = 0;
+  virtual void shelter_step(const ShelterStep<float>& step) = 0;
 
   // [batches] what each strand grows on, as ContactStep::skin. Until called, none grows on anything.
   virtual void upload_skin(std::span<const std::int32_t> skin) = 0;

@@ -9,6 +9,8 @@
 
 #include "kernels/solid/response.h"
 #include "kernels/strand/strand_step.h"
+#include "kernels/wind/shelter.h"
+#include "kernels/wind/wind_step.h"
 
 namespace ringlet::kernels {
 inline namespace RINGLET_ISA {
@@ -50,14 +52,15 @@ struct WarpScratch {
   }
 };
 
-// The two steps, one call a thread.
+// The steps, one call a thread.
+template <class Extra>
 struct StrandStepThread {
   StrandStep<float> step;
   WarpScratch scratch;
 
   RINGLET_FUNCTION void operator()(int thread) const {
     const StrandThread at = strand_of_thread(thread);
-    step_strands<float>(step, at.batch, at.lane, scratch.of(thread), kWarp);
+    step_strands<Extra, float>(step, at.batch, at.lane, scratch.of(thread), kWarp);
   }
 };
 
@@ -68,6 +71,24 @@ struct ContactStepThread {
   RINGLET_FUNCTION void operator()(int thread) const {
     const StrandThread at = strand_of_thread(thread);
     collide_strands<float>(step, at.batch, at.lane, scratch.of(thread), kWarp);
+  }
+};
+
+struct WindStepThread {
+  WindStep<float> step;
+
+  RINGLET_FUNCTION void operator()(int thread) const {
+    const StrandThread at = strand_of_thread(thread);
+    blow<float>(step, at.batch, at.lane);
+  }
+};
+
+struct ShelterStepThread {
+  ShelterStep<float> step;
+
+  RINGLET_FUNCTION void operator()(int thread) const {
+    const StrandThread at = strand_of_thread(thread);
+    shelter_strand(step, at.batch, at.lane);
   }
 };
 

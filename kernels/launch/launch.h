@@ -3,6 +3,8 @@
 #pragma once
 #include "kernels/solid/response.h"
 #include "kernels/strand/strand_batch.h"
+#include "kernels/wind/shelter.h"
+#include "kernels/wind/wind_step.h"
 
 namespace ringlet::kernels {
 
@@ -13,6 +15,8 @@ template <class T>
 struct KernelTable {
   void (*strand_step)(const StrandStep<T>& step, int begin, int end, T* scratch);
   void (*contact_step)(const ContactStep<T>& step, int begin, int end, T* scratch);
+  void (*wind_step)(const WindStep<T>& step, int begin, int end, T* scratch);
+  void (*shelter_step)(const ShelterStep<T>& step, int begin, int end, T* scratch);
 };
 
 enum class InstructionSet { kGeneric, kAvx2, kAvx512 };

@@ -28,6 +28,8 @@ struct StrandBatches {
   const T*
       stiffness;     // [rows][kCouplings] [1/s^2], or null where StrandParameters::stiffness holds everywhere
   const T* preload;  // [batches][3] -g in the strand's root frame at the first frame [m/s^2]; 0: no preload
+  const T* per_length;  // [batches] 1 / L, L the strand's rest length, 0 for one without [1/m]; or null where
+                        // nothing asks
 };
 
 template <class T>
@@ -59,6 +61,33 @@ struct StrandParameters {
   T speed_limit;                   // [m/s]
 };
 
+// Non-Hookean integrity (physics.md section 3): the tension over the elongation e, in units of kappa_I L.
+// Hooke's line t = e up to the transition, cubic pieces in e - start after it, nothing from the break on.
+inline constexpr int kMostCurvePieces = 16;
+
+template <class T>
+struct TensionCurve {
+  std::int32_t pieces;
+  T transition, breaking;
+  T start[kMostCurvePieces];
+  T coefficient[kMostCurvePieces][4];  // of the powers 0 to 3
+};
+
+template <class T>
+struct Elongation {
+  T* memory;  // [rows] elongation that the tension is taken at; null: integrity is Hookean
+  TensionCurve<T> curve;
+  bool permanent;  // memory is the largest elongation so far, not the present one
+};
+
+// The air that drags on the segments. Coefficients are over the hair's linear density.
+template <class T>
+struct Air {
+  const T* velocity;  // [rows][3] at the segment that begins there, in the world [m/s]; null: no drag
+  T normal[2];        // across the segment: linear [1/s] and quadratic [1/m] coefficient
+  T tangential[2];    // along it
+};
+
 // Written for each strand and substep, [batches][kFigures].
 enum StrandFigure { kStrain, kIterations, kSubdivisions, kSpeed, kDiverged, kFigures };
 
@@ -70,6 +99,8 @@ struct StrandStep {
   StrandParameters<T> parameters;
   T* figures;  // [batches][kFigures]: largest edge strain left [-], Newton iterations, substeps taken,
                // largest speed [m/s], 1 where diverged or not finite
+  Elongation<T> elongation{};
+  Air<T> air{};
 };
 
 }  // namespace ringlet::kernels

@@ -7,8 +7,10 @@
 // per unit mass. Assembly and factorisation are one sweep, back substitution and advance the other: nothing
 // larger than a window of four particles is assembled. Prescribed particles are eliminated.
 #pragma once
+#include "kernels/strand/air_drag.h"
 #include "kernels/strand/band_solver.h"
 #include "kernels/strand/couplings.h"
+#include "kernels/strand/elongation.h"
 #include "kernels/strand/length_projection.h"
 #include "kernels/strand/strand_batch.h"
 
@@ -27,6 +29,12 @@ struct RootMotion {
   RINGLET_KERNEL Vector3<R> ghost_after(Vector3<R> rest) const { return rotation * rest + turn * rest; }
 };
 
+// What a step may leave out; compiled once for each choice, so that what is left out costs nothing.
+template <bool kWithAir, bool kWithElongation>
+struct Extras {
+  static constexpr bool kAir = kWithAir, kElongation = kWithElongation;
+};
+
 // One pack's view of a StrandStep.
 template <class R>
 struct StrandPack {
@@ -34,6 +42,8 @@ struct StrandPack {
   const T* rest;
   const T* rest_length;
   const T* stiffness;  // or null
+  const T* air;        // or null
+  T* memory;           // of the elongation, or null
   T* position;
   T* velocity;
   int particles;
@@ -49,6 +59,8 @@ struct StrandPack {
     rest = step.batches.rest + base, rest_length = step.batches.rest_length + base;
     position = step.state.position + base, velocity = step.state.velocity + base;
     stiffness = step.batches.stiffness ? step.batches.stiffness + row * kCouplings * kLanes + lane : nullptr;
+    air = step.air.velocity ? step.air.velocity + base : nullptr;
+    memory = step.elongation.memory ? step.elongation.memory + row * kLanes + lane : nullptr;
     count = load<R>(step.batches.count + batch * kLanes + lane);
     preload = load3<R>(step.batches.preload + batch * 3 * kLanes + lane, kLanes);
     const T* motion = step.roots + static_cast<std::int64_t>(batch) * kRootValues * kLanes + lane;
@@ -124,6 +136,28 @@ struct StrandArrays {
   RINGLET_KERNEL Vector3<R> velocity_at(int i) const { return load3<R>(velocity + 3 * i * stride, stride); }
 };
 
+// Rows of the right-hand side and the diagonal that the air on the segments before and after a particle adds.
+template <class R>
+RINGLET_KERNEL void add_drag(BandWindow<R>& w, const DragTerms<R>& drag, R h) {
+  Symmetric3<R> block = drag.block;
+  block.scale(h);
+  w.diagonal.add(block);
+  w.right = fma(h, drag.pull, w.right);
+}
+
+// The elongation that this step's integrity is taken at, into the memory.
+template <class R>
+RINGLET_KERNEL void remember_elongation(const StrandPack<R>& s, const StrandStep<Scalar<R>>& step, int batch,
+                                        int lane) {
+  const R per_length = load<R>(step.batches.per_length + batch * kLanes + lane);
+  for (int i = 0; i < s.particles; ++i) {
+    const Vector3<R> here = load3<R>(s.position + 3 * i * kLanes, kLanes);
+    const R now = per_length * length(s.root.rotation * s.rest_at(i) - here);
+    const R largest = step.elongation.permanent ? max(load<R>(s.memory + i * kLanes), now) : now;
+    store(s.memory + i * kLanes, select(R(Scalar<R>(i)) < s.count, largest, R(0)));
+  }
+}
+
 template <class R>
 RINGLET_KERNEL void add_coupling(BandWindow<R>& w, const GhostTerms<R>& terms, Vector3<R> ghost_velocity, R h,
                                  R total) {
@@ -134,13 +168,13 @@ RINGLET_KERNEL void add_coupling(BandWindow<R>& w, const GhostTerms<R>& terms, V
 
 // Rows of the right-hand side and the diagonal that concern particle i alone: inertia, drag, gravity, ghosts.
 // `segment` comes from the particle before.
-template <class R>
-RINGLET_KERNEL void add_own_terms(BandWindow<R>& w, const StrandPack<R>& s,
-                                  const StrandParameters<Scalar<R>>& p, const GhostMotion<R>& ghosts, R h,
-                                  R total, int i, Vector3<R> here, Vector3<R> velocity, Vector3<R> segment,
-                                  R segment_length) {
+template <class Extra, class R>
+RINGLET_KERNEL void add_own_terms(BandWindow<R>& w, const StrandPack<R>& s, const StrandStep<Scalar<R>>& step,
+                                  const GhostMotion<R>& ghosts, R h, R total, int i, Vector3<R> here,
+                                  Vector3<R> velocity, Vector3<R> segment, R segment_length) {
+  const StrandParameters<Scalar<R>>& p = step.parameters;
   const Mask<R> lives = R(Scalar<R>(i)) < s.count;
-  const R kappa = select(lives, s.kappa(p, i, kIntegrity), R(0));
+  R kappa = select(lives, s.kappa(p, i, kIntegrity), R(0));
   const Vector3<R> rest = s.rest_at(i);
   const Vector3<R> to_ghost = ghosts.rotation * rest - here;
   const Vector3<R> ghost_velocity = ghosts.velocity(rest);
@@ -148,8 +182,12 @@ RINGLET_KERNEL void add_own_terms(BandWindow<R>& w, const StrandPack<R>& s,
   // Preloaded ghost y' = y - g / kappa_I, the offset fixed in the root frame (supplement C, sign corrected),
   // so that kappa_I (y' - x) = kappa_I (y - x) + weight.
   const Mask<R> held = kappa > R(0);
-  const Vector3<R> weight = select(held, ghosts.weight, zero3<R>());
-  const Vector3<R> weight_rate = select(held, ghosts.weight_rate, zero3<R>());
+  Vector3<R> weight = select(held, ghosts.weight, zero3<R>());
+  Vector3<R> weight_rate = select(held, ghosts.weight_rate, zero3<R>());
+  if constexpr (Extra::kElongation) {
+    const R share = secant(step.elongation.curve, load<R>(s.memory + i * kLanes));
+    kappa = share * kappa, weight = share * weight, weight_rate = share * weight_rate;
+  }
   const Vector3<R> gravity = {R(p.gravity[0]), R(p.gravity[1]), R(p.gravity[2])};
   Vector3<R> force = select(lives, gravity, zero3<R>());
   w.diagonal.add_identity(fma(h, R(p.drag), R(1)));
@@ -172,17 +210,19 @@ RINGLET_KERNEL void add_own_terms(BandWindow<R>& w, const StrandPack<R>& s,
 }
 
 // Assembles and eliminates the system of a step h for the velocities at its end, particle by particle.
-template <class R>
-RINGLET_KERNEL void factorise(const StrandPack<R>& s, const StrandParameters<Scalar<R>>& p,
+template <class Extra, class R>
+RINGLET_KERNEL void factorise(const StrandPack<R>& s, const StrandStep<Scalar<R>>& step,
                               const GhostMotion<R>& ghosts, R h, const StrandArrays<R>& from,
                               Scalar<R>* factor, int stride) {
+  const StrandParameters<Scalar<R>>& p = step.parameters;
   const R total = h * (h + R(p.damping));
   const ImplicitWeights<R> weights{total, h * h * R(p.geometric_stiffness)};
   const int n = s.particles;
   BandWindow<R> w;
   w.clear();
   Vector3<R> ahead[kBand + 1], segment = zero3<R>();  // positions of i .. i+3; from i-1 to i
-  R segment_length = R(0);
+  R segment_length = R(0), rest_before = R(0);
+  DragTerms<R> drag_before = no_drag<R>();
   RINGLET_UNROLL
   for (int a = 0; a <= kBand; ++a) ahead[a] = a < n ? from.position_at(a) : zero3<R>();
   for (int i = 0; i < n; ++i) {
@@ -196,13 +236,23 @@ RINGLET_KERNEL void factorise(const StrandPack<R>& s, const StrandParameters<Sca
       w.next_right[a] = fma(-h, edge.force, w.next_right[a]);
       w.couple(a, edge.block);
     }
+    if constexpr (Extra::kAir) {
+      const R rest_after = select(later > R(0), s.rest_length_at(i, 0), R(0));
+      const Vector3<R> next_velocity = i + 1 < n ? from.velocity_at(i + 1) : zero3<R>();
+      const DragTerms<R> drag_after =
+          segment_drag(step.air, load3<R>(s.air + 3 * i * kLanes, kLanes), ahead[1] - ahead[0], edge.length,
+                       R(Scalar<R>(0.5)) * (from.velocity_at(i) + next_velocity));
+      add_drag(w, particle_drag(drag_before, rest_before, drag_after, rest_after), h);
+      drag_before = drag_after, rest_before = rest_after;
+    }
     if (i < p.clamped) {
       // Prescribed: its known velocity moves to the right-hand side of those it pulls on.
       const Vector3<R> known = ghosts.velocity(s.rest_at(i));
       RINGLET_UNROLL
       for (int a = 0; a < kBand; ++a) w.next_right[a] = w.next_right[a] - w.below[a] * known;
     } else {
-      add_own_terms(w, s, p, ghosts, h, total, i, ahead[0], from.velocity_at(i), segment, segment_length);
+      add_own_terms<Extra>(w, s, step, ghosts, h, total, i, ahead[0], from.velocity_at(i), segment,
+                           segment_length);
       eliminate(w, factor + kFactorReals * i * stride, stride);
     }
     w.advance();
@@ -220,13 +270,14 @@ struct SubstepResult {
 // One step h from the state in `from` to that in `to` (which may be the same): velocities, positions relative
 // to the moved root, lengths with their velocity correction. `factor` holds kFactorReals values a particle,
 // `to.stride` apart.
-template <class R>
-RINGLET_KERNEL SubstepResult<R> advance_strand(const StrandPack<R>& s, const StrandParameters<Scalar<R>>& p,
+template <class Extra, class R>
+RINGLET_KERNEL SubstepResult<R> advance_strand(const StrandPack<R>& s, const StrandStep<Scalar<R>>& step,
                                                const RootMotion<R>& root, R h, const StrandArrays<R>& from,
                                                const StrandArrays<R>& to, Scalar<R>* factor, Mask<R> active) {
+  const StrandParameters<Scalar<R>>& p = step.parameters;
   const GhostMotion<R> ghosts(root, s.preload, R(1) / h);
   const int stride = to.stride;
-  factorise(s, p, ghosts, h, from, factor, stride);
+  factorise<Extra>(s, step, ghosts, h, from, factor, stride);
   Vector3<R> later[kBand] = {zero3<R>(), zero3<R>(), zero3<R>()};
   for (int i = s.particles - 1; i >= 0; --i) {
     Vector3<R> v, x;
@@ -276,7 +327,7 @@ RINGLET_KERNEL R write_back(const StrandArrays<R>& from, const StrandArrays<R>& 
 
 // The substep of one pack of strands: `lane` is its first lane in the batch. `scratch` holds kStepReals
 // values a particle, `stride` apart.
-template <class R>
+template <class Extra, class R>
 RINGLET_KERNEL void step_strands(const StrandStep<Scalar<R>>& step, int batch, int lane, Scalar<R>* scratch,
                                  int stride) {
   using T = Scalar<R>;
@@ -288,12 +339,13 @@ RINGLET_KERNEL void step_strands(const StrandStep<Scalar<R>>& step, int batch, i
   R strain = R(0), iterations = R(0), pieces = R(0), speed2 = R(0);
   Mask<R> open = s.count > R(0);
   if (!any(open)) return;  // no strands here
+  if constexpr (Extra::kElongation) remember_elongation(s, step, batch, lane);
   for (int parts = 1; parts <= kMostPieces; parts *= 2) {
     R worst = R(0);
     for (int part = 0; part < parts; ++part) {
       const StrandArrays<R> from = part == 0 ? state : stepped;
-      const SubstepResult<R> result = advance_strand(s, p, piece(s.root, part, parts), R(p.step / T(parts)),
-                                                     from, stepped, scratch, open);
+      const SubstepResult<R> result = advance_strand<Extra>(
+          s, step, piece(s.root, part, parts), R(p.step / T(parts)), from, stepped, scratch, open);
       worst = select(open, result.strain, worst);
       iterations = iterations + select(open, result.iterations, R(0));
     }
@@ -312,6 +364,20 @@ RINGLET_KERNEL void step_strands(const StrandStep<Scalar<R>>& step, int batch, i
   store(s.figures + kSpeed * kLanes, sqrt(speed2));
   const Mask<R> healthy = (strain <= R(p.strain_limit)) & (speed2 <= R(p.speed_limit * p.speed_limit));
   store(s.figures + kDiverged * kLanes, select(healthy, R(0), R(1)));
+}
+
+// Calls `call` with the Extras that a step asks for.
+template <class T, class Call>
+void with_extras(const StrandStep<T>& step, const Call& call) {
+  const bool air = step.air.velocity != nullptr, elongation = step.elongation.memory != nullptr;
+  if (air && elongation)
+    call(Extras<true, true>{});
+  else if (air)
+    call(Extras<true, false>{});
+  else if (elongation)
+    call(Extras<false, true>{});
+  else
+    call(Extras<false, false>{});
 }
 
 }  // namespace RINGLET_ISA

@@ -41,18 +41,18 @@ class CudaExecutor : public Executor<float> {
   }
 
   void submit(const state::StrandState<float>& state) override {
-    on_device([&] { strands_->upload_state(state.position, state.velocity); });
+    on_device([&] { strands_->upload_state({state.position, state.velocity, state.elongation}); });
   }
   void submit_roots(const state::StrandState<float>& state) override {
     on_device([&] { strands_->upload_roots(state.root_motion, state.root_points); });
   }
   void fetch(state::StrandState<float>& state) override {
-    on_device([&] { strands_->download_state(state.position, state.velocity); });
+    on_device([&] { strands_->download_state({state.position, state.velocity, state.elongation}); });
   }
 
   void strand_step(const kernels::StrandStep<float>& step) override {
     on_device([&] {
-      strands_->strand_step(step.parameters);
+      strands_->strand_step(step);
       strands_->download_figures({step.figures, lanes_ * kernels::kFigures}, {});
     });
   }
@@ -67,6 +67,13 @@ class CudaExecutor : public Executor<float> {
                               step.skipped_substeps, step.home});
       strands_->download_figures({}, {step.figures, lanes_ * kernels::kContactFigures});
     });
+  }
+
+  void wind_step(const kernels::WindStep<float>& step) override {
+    on_device([&] { strands_->wind_step(step); });
+  }
+  void shelter_step(const kernels::ShelterStep<float>& step) override {
+    on_device([&] { strands_->shelter_step(step); });
   }
 
  private:

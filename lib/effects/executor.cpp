@@ -38,6 +38,8 @@ class CpuExecutor : public Executor<T> {
   void fetch(state::StrandState<T>&) override {}
   void strand_step(const kernels::StrandStep<T>& step) override { run(kernels_.strand_step, step); }
   void contact_step(const kernels::ContactStep<T>& step, int) override { run(kernels_.contact_step, step); }
+  void wind_step(const kernels::WindStep<T>& step) override { run(kernels_.wind_step, step); }
+  void shelter_step(const kernels::ShelterStep<T>& step) override { run(kernels_.shelter_step, step); }
 
  private:
   template <class Step>

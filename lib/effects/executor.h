@@ -9,7 +9,11 @@
 namespace ringlet::kernels {
 template <class T>
 struct ContactStep;
-}
+template <class T>
+struct WindStep;
+template <class T>
+struct ShelterStep;
+}  // namespace ringlet::kernels
 
 namespace ringlet::effects {
 
@@ -28,6 +32,8 @@ class Executor {
   virtual void strand_step(const kernels::StrandStep<T>& step) = 0;
   // `frame`: the number of the frame stepped to. A deforming solid's level sets are the same throughout it.
   virtual void contact_step(const kernels::ContactStep<T>& step, int frame) = 0;
+  virtual void wind_step(const kernels::WindStep<T>& step) = 0;
+  virtual void shelter_step(const kernels::ShelterStep<T>& step) = 0;
 };
 
 // `instruction_set`: avx512, avx2 or generic; empty: the widest this processor has. Throws Error{kUsage} for

@@ -10,8 +10,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/random.h"
 #include "groom/groom.h"
-#include "groom/random.h"
 #include "groom/scalp.h"
 #include "groom/up_axis.h"
 

@@ -8,7 +8,7 @@
 #include <numeric>
 
 #include "core/error.h"
-#include "groom/random.h"
+#include "core/random.h"
 
 namespace ringlet::groom {
 

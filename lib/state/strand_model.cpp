@@ -1,5 +1,7 @@
 #include "state/strand_model.h"
 
+#include <algorithm>
+
 #include "kernels/backend/vector.h"
 
 namespace ringlet::state {
@@ -28,7 +30,8 @@ StrandModel<T>::StrandModel(const StrandInput& input)
       rest(layout.rows() * 3 * kLanes, T(0)),
       rest_length(layout.rows() * 3 * kLanes, T(0)),
       stiffness(input.stiffness.empty() ? 0 : layout.rows() * kCouplings * kLanes, T(0)),
-      preload(layout.batches() * 3 * kLanes, T(0)) {
+      preload(layout.batches() * 3 * kLanes, T(0)),
+      per_length(input.elongation ? layout.batches() * kLanes : 0, T(0)) {
   std::size_t first = 0;
   for (std::size_t strand = 0; strand < input.counts.size(); ++strand) {
     const int n = input.counts[strand];
@@ -45,6 +48,11 @@ StrandModel<T>::StrandModel(const StrandInput& input)
       for (int a = 0; a < 3 && i + 1 + a < n; ++a)
         rest_length[layout.at(strand, i, 3, a)] =
             kernels::length(get(rest, layout, strand, i + 1 + a) - get(rest, layout, strand, i));
+    if (input.elongation) {
+      double length = 0;
+      for (int i = 0; i + 1 < n; ++i) length += (input.rest[first + i + 1] - input.rest[first + i]).norm();
+      per_length[layout.at_strand(strand, 1, 0)] = static_cast<T>(length > 0 ? 1 / length : 0);
+    }
     if (input.preload) {
       const Vec3 against = -(input.first_rotation[strand].transpose() * *input.preload);
       for (int c = 0; c < 3; ++c) preload[layout.at_strand(strand, 3, c)] = static_cast<T>(against[c]);
@@ -55,14 +63,16 @@ StrandModel<T>::StrandModel(const StrandInput& input)
 
 template <class T>
 kernels::StrandBatches<T> StrandModel<T>::view() const {
-  return {layout.batches(), layout.row().data(), count.data(),
-          rest.data(),      rest_length.data(),  stiffness.empty() ? nullptr : stiffness.data(),
-          preload.data()};
+  const auto or_null = [](const AlignedVector<T>& array) { return array.empty() ? nullptr : array.data(); };
+  return {layout.batches(),   layout.row().data(), count.data(),   rest.data(),
+          rest_length.data(), or_null(stiffness),  preload.data(), or_null(per_length)};
 }
 
 template <class T>
 std::size_t StrandModel<T>::bytes() const {
-  return (count.size() + rest.size() + rest_length.size() + stiffness.size() + preload.size()) * sizeof(T);
+  return (count.size() + rest.size() + rest_length.size() + stiffness.size() + preload.size() +
+          per_length.size()) *
+         sizeof(T);
 }
 
 template <class T>
@@ -74,7 +84,7 @@ StrandState<T>::StrandState(const StrandLayout& layout)
 
 template <class T>
 std::size_t StrandState<T>::bytes() const {
-  return (position.size() + velocity.size() + root_motion.size()) * sizeof(T) +
+  return (position.size() + velocity.size() + root_motion.size() + elongation.size()) * sizeof(T) +
          root_points.size() * sizeof(double);
 }
 
@@ -110,6 +120,7 @@ void pose_at_rest(StrandState<T>& state, const StrandModel<T>& model, std::span<
     }
     for (int c = 0; c < 3; ++c) state.root_points[layout.at_strand(strand, 3, c)] = roots[strand].position[c];
   }
+  std::fill(state.elongation.begin(), state.elongation.end(), T(0));
 }
 
 template struct StrandModel<float>;

@@ -20,12 +20,14 @@ struct StrandInput {
   std::vector<float> stiffness;      // [particles * kCouplings] [1/s^2], empty: uniform
   std::vector<Mat3> first_rotation;  // [strands] root rotation at the first frame; for the preload
   std::optional<Vec3> preload;       // gravity to preload against [m/s^2]; empty: no preload
+  bool elongation = false;           // the strands' lengths are asked for (kernels::Elongation)
 };
 
 template <class T>
 struct StrandModel {
   StrandLayout layout;
   AlignedVector<T> count, rest, rest_length, stiffness, preload;
+  AlignedVector<T> per_length;  // [batches] or empty
 
   explicit StrandModel(const StrandInput& input);
   kernels::StrandBatches<T> view() const;
@@ -37,6 +39,9 @@ struct StrandState {
   AlignedVector<T> position, velocity;  // [rows][3]
   AlignedVector<T> root_motion;         // [batches][kRootValues]
   AlignedVector<double> root_points;    // [batches][3] at the substep's end [m]
+  // Empty, unless an effect that has them is there; it makes them.
+  AlignedVector<T> elongation;  // [rows] kernels::Elongation::memory
+  AlignedVector<T> air;         // [rows][3] kernels::Air::velocity [m/s]
 
   explicit StrandState(const StrandLayout& layout);
   kernels::StrandState<T> view() { return {position.data(), velocity.data()}; }

@@ -51,13 +51,13 @@ struct DeviceGroom {
         velocity(host.state.velocity.size()),
         strand_figures(host.strand_figures.size()),
         contact_figures(host.contact_figures.size()) {
-    strands->upload_state(host.state.position, host.state.velocity);
+    strands->upload_state({host.state.position, host.state.velocity, host.state.elongation});
   }
   void move_roots(const HostGroom& host) {
     strands->upload_roots(host.state.root_motion, host.state.root_points);
   }
   void fetch() {
-    strands->download_state(position, velocity);
+    strands->download_state({position, velocity, {}});
     strands->download_figures(strand_figures, contact_figures);
   }
 };
@@ -68,7 +68,7 @@ void expect_same_steps(HostGroom host, const StrandParameters<float>& parameters
     host.move_roots(parameters.step);
     device.move_roots(host);
     host.step(parameters);
-    device.strands->strand_step(parameters);
+    device.strands->strand_step(host.strand_step(parameters));
   }
   device.fetch();
   EXPECT_EQ(differing(device.position, host.state.position), 0);
@@ -160,7 +160,7 @@ TEST_F(Cuda, ContactsAgree) {
     host.move_roots(parameters.step);
     device.move_roots(host);
     host.step(parameters);
-    device.strands->strand_step(parameters);
+    device.strands->strand_step(host.strand_step(parameters));
     host.collide(solids.at(k), parameters.step);
     device.strands->upload_solids(solids.at(k), Solids::interval_of(k));
     device.strands->contact_step(contact);
@@ -196,7 +196,7 @@ TEST_F(Cuda, LaunchesAreNamedAndTimed) {
   DeviceGroom device(host, CudaTiming::kOn);
   host.move_roots(parameters.step);
   device.move_roots(host);
-  for (int k = 0; k < 300; ++k) device.strands->strand_step(parameters);
+  for (int k = 0; k < 300; ++k) device.strands->strand_step(host.strand_step(parameters));
   device.strands->contact_step({parameters.step, 1, 4, 3, 1e-4f, 10, 1000, 0, 0});
   const std::vector<CudaLaunches> launches = device.strands->launches();
   ASSERT_EQ(launches.size(), 2u);
@@ -225,7 +225,7 @@ TEST_F(Cuda, WrongSizesAreRefused) {
   const HostGroom host(helices(3));
   DeviceGroom device(host);
   const std::vector<float> few(5);
-  EXPECT_THROW(device.strands->upload_state(few, host.state.velocity), CudaError);
+  EXPECT_THROW(device.strands->upload_state({few, host.state.velocity, {}}), CudaError);
   EXPECT_THROW(device.strands->upload_skin(std::vector<std::int32_t>(5)), CudaError);
 }
 

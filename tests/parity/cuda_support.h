@@ -113,7 +113,7 @@ struct HostGroom {
   }
   void step(const kernels::StrandParameters<float>& parameters) {
     for_each_lane([&, step = strand_step(parameters)](int batch, int lane) {
-      kernels::step_strands<float>(step, batch, lane, scratch_.data(), 1);
+      kernels::step_strands<kernels::Extras<false, false>, float>(step, batch, lane, scratch_.data(), 1);
     });
   }
 

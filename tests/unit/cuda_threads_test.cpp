@@ -80,7 +80,7 @@ TEST(CudaThreads, StepAsTheLanesDo) {
     lanes.move_roots(parameters.step), threads.move_roots(parameters.step);
     lanes.step(parameters);
     run_threads(threads, [&](WarpScratch scratch) {
-      return StrandStepThread{threads.strand_step(parameters), scratch};
+      return StrandStepThread<Extras<false, false>>{threads.strand_step(parameters), scratch};
     });
   }
   EXPECT_EQ(lanes.state.position, threads.state.position);

@@ -8,9 +8,9 @@
 #include <sstream>
 
 #include "core/error.h"
+#include "core/random.h"
 #include "core/timer.h"
 #include "groom/closest_triangle.h"
-#include "groom/random.h"
 #include "unit/groom_support.h"
 
 namespace ringlet::groom::test {

@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "core/error.h"
-#include "groom/random.h"
+#include "core/random.h"
 #include "unit/groom_support.h"
 
 namespace ringlet::groom::test {

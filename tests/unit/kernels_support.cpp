@@ -10,12 +10,22 @@ const kernels::KernelTable<T>& scalar_kernels() {
       [](const kernels::StrandStep<T>& step, int begin, int end, T* scratch) {
         for (int batch = begin; batch < end; ++batch)
           for (int lane = 0; lane < kernels::kLanes; ++lane)
-            kernels::step_strands<T>(step, batch, lane, scratch, 1);
+            kernels::with_extras(step, [&](auto extra) {
+              kernels::step_strands<decltype(extra), T>(step, batch, lane, scratch, 1);
+            });
       },
       [](const kernels::ContactStep<T>& step, int begin, int end, T* scratch) {
         for (int batch = begin; batch < end; ++batch)
           for (int lane = 0; lane < kernels::kLanes; ++lane)
             kernels::collide_strands<T>(step, batch, lane, scratch, 1);
+      },
+      [](const kernels::WindStep<T>& step, int begin, int end, T*) {
+        for (int batch = begin; batch < end; ++batch)
+          for (int lane = 0; lane < kernels::kLanes; ++lane) kernels::blow<T>(step, batch, lane);
+      },
+      [](const kernels::ShelterStep<T>& step, int begin, int end, T*) {
+        for (int batch = begin; batch < end; ++batch)
+          for (int lane = 0; lane < kernels::kLanes; ++lane) kernels::shelter_strand(step, batch, lane);
       }};
   return table;
 }

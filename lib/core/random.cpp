@@ -1,8 +1,8 @@
-#include "groom/random.h"
+#include "core/random.h"
 
 #include <cmath>
 
-namespace ringlet::groom {
+namespace ringlet {
 
 std::array<double, 2> cos_sin(double angle) {
   // Half of pi in two parts, the first of few enough bits that its multiples are exact.
@@ -27,4 +27,4 @@ std::array<double, 2> cos_sin(double angle) {
   }
 }
 
-}  // namespace ringlet::groom
+}  // namespace ringlet

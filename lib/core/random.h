@@ -1,12 +1,12 @@
-// Random numbers and the circular functions that are the same on every machine. Private to the room.
+// Random numbers and the circular functions that are the same on every machine.
 //
 // The standard's engines are portable, its distributions are not, and libm's sine differs between versions in
-// the last bit: growth must not.
+// the last bit: growth and noise must not.
 #pragma once
 #include <array>
 #include <cstdint>
 
-namespace ringlet::groom {
+namespace ringlet {
 
 // SplitMix64 (Steele, Lea, Flood 2014): one stream for each (seed, stream) pair.
 class Random {
@@ -39,4 +39,4 @@ class Random {
 // series.
 std::array<double, 2> cos_sin(double angle);
 
-}  // namespace ringlet::groom
+}  // namespace ringlet

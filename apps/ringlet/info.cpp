@@ -113,6 +113,7 @@ Report last_frame_of(const cache::CacheReader& reader, const InfoOptions& option
   report["bounds"] = bounds(frame.position.size() / 3, points_of(frame.position));
   report["fields"] = {"position"};
   if (!frame.velocity.empty()) report["fields"].push_back("velocity");
+  if (!frame.elongation.empty()) report["fields"].push_back("elongation");
   if (!frame.surface_vertices.empty()) report["fields"].push_back("solids");
   report["figures"] = json_of(frame.figures);
   if (options.strand)

@@ -36,6 +36,7 @@ bool same_bits(const std::vector<T>& a, const std::vector<T>& b) {
 
 bool identical(const Frame& a, const Frame& b) {
   return same_bits(a.position, b.position) && same_bits(a.velocity, b.velocity) &&
+         same_bits(a.elongation, b.elongation) &&
          std::equal(a.surface_vertices.begin(), a.surface_vertices.end(), b.surface_vertices.begin(),
                     b.surface_vertices.end(), same_bits<float>);
 }

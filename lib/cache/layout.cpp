@@ -128,7 +128,7 @@ const char* to_string(Content content) {
 }
 
 FrameRecord record_of(const state::Frame& frame) {
-  FrameRecord record{frame.time, frame.figures, !frame.velocity.empty(), {}};
+  FrameRecord record{frame.time, frame.figures, !frame.velocity.empty(), !frame.elongation.empty(), {}};
   for (const auto& vertices : frame.surface_vertices) record.vertices.push_back(vertices.size() / 3);
   return record;
 }
@@ -239,6 +239,8 @@ void write_frame(const h5::Object& root, const state::Frame& frame, const Storag
   write_positions(root, frame.position, storage);
   if (!frame.velocity.empty())
     write_floats(root, "velocity", frame.velocity, {frame.velocity.size() / 3, 3}, storage.compression);
+  if (!frame.elongation.empty())
+    write_floats(root, "elongation", frame.elongation, {frame.elongation.size()}, storage.compression);
   write_figures(root, frame.figures);
   if (frame.surface_vertices.empty()) return;
   const h5::Object surfaces = root.create_group("surfaces");
@@ -256,6 +258,7 @@ state::Frame read_frame(const h5::Object& root, const state::RunHeader* header) 
   frame.time = root.number<double>("time");
   frame.position = root.read<float>("position", {particles, 3});
   if (root.has("velocity")) frame.velocity = root.read<float>("velocity", {frame.position.size() / 3, 3});
+  if (root.has("elongation")) frame.elongation = root.read<float>("elongation", {frame.position.size() / 3});
   frame.figures = read_figures(root);
   if (!root.has("surfaces")) return frame;
   const h5::Object surfaces = root.group("surfaces");
@@ -265,7 +268,8 @@ state::Frame read_frame(const h5::Object& root, const state::RunHeader* header) 
 }
 
 FrameRecord read_record(const h5::Object& root) {
-  FrameRecord record{root.number<double>("time"), read_figures(root), root.has("velocity"), {}};
+  FrameRecord record{
+      root.number<double>("time"), read_figures(root), root.has("velocity"), root.has("elongation"), {}};
   if (!root.has("surfaces")) return record;
   const h5::Object surfaces = root.group("surfaces");
   for (const std::string& name : surfaces.children())
@@ -326,6 +330,8 @@ void write_sequence(const h5::Object& root, const std::map<int, FrameRecord>& fr
   write_field(root, "position", "/position", {particles, 3}, frames, files, [](const auto&) { return true; });
   write_field(root, "velocity", "/velocity", {particles, 3}, frames, files,
               [](const FrameRecord& record) { return record.velocity; });
+  write_field(root, "elongation", "/elongation", {particles}, frames, files,
+              [](const FrameRecord& record) { return record.elongation; });
   for (std::size_t i = 0; i < header.surfaces.size(); ++i) {
     const auto has = [i](const FrameRecord& record) { return i < record.vertices.size(); };
     const auto first =
@@ -346,6 +352,8 @@ void write_single(const h5::Object& root, const state::Frame& frame) {
   };
   write(root, "position", frame.position);
   if (!frame.velocity.empty()) write(root, "velocity", frame.velocity);
+  if (!frame.elongation.empty())
+    root.write_deflated("elongation", frame.elongation, {1, frame.elongation.size()});
   for (std::size_t i = 0; i < frame.surface_vertices.size(); ++i)
     write(root.group(surface_path(i)), "vertices", frame.surface_vertices[i]);
 }
@@ -357,6 +365,7 @@ state::Frame read_single(const h5::Object& root, const state::RunHeader& header)
   const h5::Dims shape = {1, header.rest_position.size() / 3, 3};
   frame.position = root.read<float>("position", shape);
   if (root.has("velocity")) frame.velocity = root.read<float>("velocity", shape);
+  if (root.has("elongation")) frame.elongation = root.read<float>("elongation", {1, shape[1]});
   const h5::Object figures = root.group("figures");
   for (const std::string& name : figures.children())
     frame.figures.emplace_back(name, figures.read<double>(name, {1})[0]);

@@ -24,7 +24,7 @@ struct Storage {
 struct FrameRecord {
   double time = 0;
   state::Figures figures;
-  bool velocity = false;
+  bool velocity = false, elongation = false;
   std::vector<std::size_t> vertices;  // of each surface
 };
 FrameRecord record_of(const state::Frame& frame);

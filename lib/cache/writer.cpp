@@ -35,7 +35,7 @@ struct Item {
 };
 
 std::size_t bytes_of(const state::Frame& frame) {
-  std::size_t floats = frame.position.size() + frame.velocity.size();
+  std::size_t floats = frame.position.size() + frame.velocity.size() + frame.elongation.size();
   for (const auto& vertices : frame.surface_vertices) floats += vertices.size();
   return floats * sizeof(float) + 65536;
 }

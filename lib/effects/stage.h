@@ -2,6 +2,7 @@
 // list.
 #pragma once
 #include <cstddef>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -14,7 +15,7 @@ namespace ringlet::effects {
 struct Substep {
   int frame;
   double time_before, time, step;
-  bool last_of_frame;
+  bool first_of_frame, last_of_frame;
 };
 
 // What a frame looked like strand by strand, gathered by the stages over its substeps.
@@ -42,8 +43,8 @@ class Stage {
  public:
   virtual ~Stage() = default;
   virtual std::string name() const = 0;
-  virtual std::size_t bytes() const = 0;  // that it owns
-  virtual int launches() const = 0;       // kernel launches a substep
+  virtual std::size_t bytes() const = 0;      // that it owns
+  virtual std::int64_t launches() const = 0;  // kernel launches a frame
   virtual void run(Executor<T>& executor, const Substep& substep, FrameReport& report) = 0;
   // The first strand that diverged in the last `run`, -1 for none.
   virtual std::int64_t diverged_strand() const { return -1; }

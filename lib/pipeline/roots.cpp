@@ -1,5 +1,7 @@
 #include "pipeline/roots.h"
 
+#include <algorithm>
+
 #include "solids/keyframes.h"
 
 namespace ringlet::pipeline {
@@ -16,6 +18,13 @@ void Roots::add_attached(groom::Attachment attachment, std::vector<Vec3> rest) {
 void Roots::add_fixed(const scene::Animation& animation, std::vector<Vec3> rest) {
   strands_ += rest.size();
   groups_.push_back({std::nullopt, animation, std::move(rest)});
+}
+
+Vec3 Roots::centre() const {
+  Vec3 sum = Vec3::Zero();
+  for (const Group& group : groups_)
+    for (const Vec3& root : group.rest) sum += root;
+  return sum / static_cast<double>(std::max<std::size_t>(strands_, 1));
 }
 
 bool Roots::still() const {

@@ -22,7 +22,8 @@ class Roots {
   void add_fixed(const scene::Animation& animation, std::vector<Vec3> rest);
 
   std::size_t strands() const { return strands_; }
-  bool still() const;  // nothing moves: every pose is the rest pose
+  Vec3 centre() const;  // mean of the rest roots [m]
+  bool still() const;   // nothing moves: every pose is the rest pose
   void pose(double time, std::span<Pose> out) const;
 
  private:

@@ -11,6 +11,7 @@
 #include "core/timer.h"
 #include "effects/solids/contact_stage.h"
 #include "effects/strands/strand_stage.h"
+#include "effects/wind/wind_stage.h"
 #include "pipeline/report.h"
 #include "pipeline/world.h"
 
@@ -33,6 +34,7 @@ state::StrandInput strand_input(const scene::Scene& scene, const World& world) {
   for (std::size_t s = 0; s < world.strands.size(); ++s) input.counts.push_back(world.strands.count(s));
   input.rest = world.strands.points;
   input.stiffness = world.stiffness;
+  input.elongation = scene.effects.non_hookean.has_value();
   if (scene.model.preload && scene.effects.gravity) {
     std::vector<Pose> poses(world.strands.size());
     world.roots->pose(first_time(scene.frames), poses);
@@ -100,6 +102,9 @@ class TypedSimulation : public Simulation {
         executor_(make_executor(model_, options)),
         before_(world_.strands.size()),
         now_(world_.strands.size()) {
+    if (scene_.effects.wind)
+      stages_.push_back(
+          effects::make_wind_stage<T>(scene_, world_.head.get(), world_.roots->centre(), model_, state_));
     stages_.push_back(effects::make_strand_stage<T>(scene_, model_, state_));
     if (!world_.solids.empty())
       stages_.push_back(effects::make_contact_stage<T>(scene_, world_.solids, world_.skin, model_, state_));
@@ -146,13 +151,14 @@ void TypedSimulation<T>::make_plan() {
     PlannedStage planned{name, what, false, 0, 0};
     for (const auto& stage : stages_) {
       if (stage->name() != name) continue;
-      planned = {name, what, true, stage->bytes(), substeps * stage->launches()};
+      planned = {name, what, true, stage->bytes(), plan_.frames * stage->launches()};
     }
     plan_.stages.push_back(planned);
   };
   plan_.stages.push_back({"roots", "root frames carried by the head", true,
                           (before_.size() + now_.size()) * sizeof(Pose),
                           world_.roots->still() ? 0 : substeps});
+  add("wind", "mean wind, gusts, turbulence, shelter");
   add("strands", "springs, ghosts, implicit step, lengths");
   add("solids", "collision with level sets, friction");
 }
@@ -222,8 +228,8 @@ void TypedSimulation<T>::step_frame(int frame, effects::FrameReport& report, Sta
   seconds.assign(1, {"roots", 0.0});
   for (const auto& stage : stages_) seconds.emplace_back(stage->name(), 0.0);
   for (int s = 0; s < substeps; ++s) {
-    const effects::Substep substep{frame, time_of(frame - 1, s), time_of(frame - 1, s + 1), step,
-                                   s + 1 == substeps};
+    const effects::Substep substep{frame,  time_of(frame - 1, s), time_of(frame - 1, s + 1), step,
+                                   s == 0, s + 1 == substeps};
     Timer timer;
     if (!still) move_roots(substep.time);
     seconds[0].second += timer.seconds();
@@ -279,6 +285,7 @@ state::Frame TypedSimulation<T>::frame_now(int number) const {
   frame.time = time_of(number, 0);
   frame.position.resize(world_.strands.points.size() * 3);
   if (asked("velocity")) frame.velocity.resize(frame.position.size());
+  if (asked("elongation")) frame.elongation.resize(world_.strands.points.size());
   tbb::parallel_for(std::size_t{0}, layout.strands(), [&](std::size_t s) {
     for (int i = 0; i < layout.count(s); ++i) {
       for (int c = 0; c < 3; ++c) {
@@ -288,6 +295,9 @@ state::Frame TypedSimulation<T>::frame_now(int number) const {
         frame.position[out] = static_cast<float>(x / unit);
         if (!frame.velocity.empty()) frame.velocity[out] = static_cast<float>(state_.velocity[in] / unit);
       }
+      if (!frame.elongation.empty())
+        frame.elongation[world_.strands.offsets[s] + i] =
+            static_cast<float>(state_.elongation[layout.at(s, i, 1, 0)]);
     }
   });
   if (!asked("solids")) return frame;
@@ -307,6 +317,8 @@ state::Snapshot TypedSimulation<T>::snapshot(int frame) const {
   snapshot.frame = frame;
   snapshot.arrays["position"] = bytes_of(state_.position.data(), state_.position.size() * sizeof(T));
   snapshot.arrays["velocity"] = bytes_of(state_.velocity.data(), state_.velocity.size() * sizeof(T));
+  if (!state_.elongation.empty())
+    snapshot.arrays["elongation"] = bytes_of(state_.elongation.data(), state_.elongation.size() * sizeof(T));
   return snapshot;
 }
 
@@ -326,6 +338,7 @@ bool TypedSimulation<T>::run(const FrameRange& range, state::FrameSink& sink, co
     frame = control.resume->frame;
     restore(*control.resume, "position", state_.position);
     restore(*control.resume, "velocity", state_.velocity);
+    if (!state_.elongation.empty()) restore(*control.resume, "elongation", state_.elongation);
     world_.roots->pose(time_of(frame, 0), now_);
     for (std::size_t s = 0; s < now_.size(); ++s) set_root_motion(state_, model_.layout, s, now_[s], now_[s]);
     executor_->submit(state_);

@@ -1,5 +1,6 @@
 #include "scene/build.h"
 
+#include <algorithm>
 #include <numbers>
 
 #include "scene/checks.h"
@@ -47,6 +48,8 @@ class Builder {
     scene.model = model();
     if (effects.contains("gravity")) scene.effects.gravity = vec3(effects["gravity"]);
     if (effects.contains("inextensible")) scene.effects.inextensible = inextensible(effects["inextensible"]);
+    if (effects.contains("non_hookean")) scene.effects.non_hookean = non_hookean(effects["non_hookean"]);
+    if (effects.contains("wind")) scene.effects.wind = wind(effects["wind"]);
     for (std::size_t i = 0; i < effects["solids"].size(); ++i)
       scene.effects.solids.push_back(solid("/effects/solids" + pointer_token(i), effects["solids"][i]));
     scene.effects.collision = {effects["collision"]["iterations"]};
@@ -182,6 +185,37 @@ class Builder {
     const auto cadence =
         word<Cadence>(block["per"], {{"substep", Cadence::kSubstep}, {"frame", Cadence::kFrame}});
     return {block["tolerance"], block["max_iterations"], cadence};
+  }
+
+  static NonHookean non_hookean(const Json& block) {
+    const auto memory = word<Memory>(
+        block["memory"], {{"permanent", Memory::kPermanent}, {"reversible", Memory::kReversible}});
+    return {memory, block["curve"].get<Curve>()};
+  }
+
+  // Empty for one that never blows.
+  static std::optional<Wind> wind(const Json& block) {
+    Wind wind;
+    const Vec3 constant = block.contains("velocity") ? vec3(block["velocity"]) : Vec3::Zero();
+    if (!block.contains("keys")) wind.keys = {{0.0, constant}};
+    if (block.contains("keys"))
+      for (const Json& key : block["keys"])
+        wind.keys.push_back({key["frame"], constant + vec3(key["velocity"])});
+    const auto blows = [](const WindKey& key) { return key.velocity != Vec3::Zero(); };
+    if (std::none_of(wind.keys.begin(), wind.keys.end(), blows)) return std::nullopt;
+    if (block.contains("gusts")) {
+      const Json& gusts = block["gusts"];
+      wind.gusts = {gusts["strength"], gusts["period"], gusts["seed"]};
+    }
+    if (block.contains("turbulence")) {
+      const Json& eddies = block["turbulence"];
+      wind.turbulence = {eddies["strength"], eddies["scale"], eddies["octaves"], eddies["seed"]};
+    }
+    if (block.contains("shelter")) wind.shelter = {block["shelter"]["strength"], block["shelter"]["wake"]};
+    const auto drag = [](const Json& law) { return DragCoefficients{law["linear"], law["quadratic"]}; };
+    wind.normal = drag(block["normal_drag"]), wind.tangential = drag(block["tangential_drag"]);
+    wind.linear_density = block["linear_density"];
+    return wind;
   }
 
   Solid solid(const std::string& pointer, const Json& block) const {

@@ -58,6 +58,8 @@ class Checks {
     frames();
     if (has_head()) keys("/head/animation", document_["head"]["animation"]);
     for (const auto& [pointer, groom] : grooms_of(document_)) check_groom(pointer, *groom);
+    non_hookean();
+    wind();
     const Json& solids = document_["effects"]["solids"];
     for (std::size_t i = 0; i < solids.size(); ++i) solid("/effects/solids" + pointer_token(i), solids[i]);
     cache();
@@ -145,6 +147,39 @@ class Checks {
     }
   }
 
+  void non_hookean() {
+    if (!document_["effects"].contains("non_hookean")) return;
+    const Json& curve = document_["effects"]["non_hookean"]["curve"];
+    const auto at = [](std::size_t i, int axis) {
+      return fmt::format("/effects/non_hookean/curve/{}/{}", i, axis);
+    };
+    if (curve[0][0] != curve[0][1])
+      add(at(0, 1), brief(curve[0][1]), "the first point on Hooke's line, " + brief(curve[0][0]));
+    for (std::size_t i = 1; i < curve.size(); ++i) {
+      if (curve[i][0] <= curve[i - 1][0])
+        add(at(i, 0), brief(curve[i][0]),
+            "an elongation after the previous point's " + brief(curve[i - 1][0]));
+      if (curve[i][1] < curve[i - 1][1])
+        add(at(i, 1), brief(curve[i][1]),
+            "a tension not under the previous point's " + brief(curve[i - 1][1]), "the curve must not fall");
+    }
+  }
+
+  void wind() {
+    if (!document_["effects"].contains("wind")) return;
+    const Json& wind = document_["effects"]["wind"];
+    const bool keyed = wind.contains("keys");
+    if (!keyed && !wind.contains("velocity"))
+      add("/effects/wind", "neither velocity nor keys", "one of them, or both");
+    if (keyed)
+      for (std::size_t i = 1; i < wind["keys"].size(); ++i)
+        if (wind["keys"][i]["frame"] <= wind["keys"][i - 1]["frame"])
+          add("/effects/wind/keys" + pointer_token(i) + "/frame", brief(wind["keys"][i]["frame"]),
+              "a frame after the previous key's " + brief(wind["keys"][i - 1]["frame"]));
+    if (wind.contains("shelter") && !has_head())
+      add("/effects/wind/shelter", "shelter without a head", "a head in the scene");
+  }
+
   void solid(const std::string& pointer, const Json& solid) {
     if (solid["source"] != "head") return keys(pointer + "/animation", solid["animation"]);
     if (!has_head())
@@ -159,6 +194,9 @@ class Checks {
     const Json& fields = document_["cache"]["fields"];
     if (std::find(fields.begin(), fields.end(), "position") == fields.end())
       add("/cache/fields", brief(fields), "a list with \"position\"");
+    if (std::find(fields.begin(), fields.end(), "elongation") != fields.end() &&
+        !document_["effects"].contains("non_hookean"))
+      add("/cache/fields", "\"elongation\"", "none without effects.non_hookean");
   }
 
   void unique_names() {

@@ -161,6 +161,49 @@ struct Inextensible {
   Cadence cadence;
 };
 
+enum class Memory { kPermanent, kReversible };
+
+struct NonHookean {  // physics.md section 3
+  Memory memory;
+  Curve curve;  // [elongation, tension / (kappa_I L)]: end of the linear range first, breaking point last
+};
+
+struct DragCoefficients {
+  double linear, quadratic;  // [N s/m^2], [N s^2/m^3]: force on a metre of hair
+};
+
+struct WindKey {
+  double frame;
+  Vec3 velocity;  // [m/s]
+};
+
+struct Gusts {
+  double strength;  // [-] greatest relative change of the mean wind
+  double period;    // [s]
+  std::int64_t seed;
+};
+
+struct Turbulence {
+  double strength;  // [-] root mean square speed of the eddies over the mean wind's
+  double scale;     // [m] size of the largest
+  int octaves;
+  std::int64_t seed;
+};
+
+struct Shelter {
+  double strength;  // [-] share of the wind that is missing right behind the head
+  double wake;      // [m] where half of that is missing
+};
+
+struct Wind {
+  std::vector<WindKey> keys;  // the mean wind, never empty; linear between keys, held outside
+  std::optional<Gusts> gusts;
+  std::optional<Turbulence> turbulence;
+  std::optional<Shelter> shelter;
+  DragCoefficients normal, tangential;
+  double linear_density;  // [kg/m]
+};
+
 struct Solid {
   bool is_head;                   // "source": "head"
   std::optional<MeshDesc> mesh;   // otherwise a mesh of its own
@@ -182,6 +225,8 @@ struct Collision {  // alternation of contact and length projections, once a sub
 struct Effects {
   std::optional<Vec3> gravity;  // [m/s^2]
   std::optional<Inextensible> inextensible;
+  std::optional<NonHookean> non_hookean;
+  std::optional<Wind> wind;  // one that blows at some time
   std::vector<Solid> solids;
   Collision collision;
 };
@@ -194,7 +239,7 @@ struct Limits {
 enum class Compression { kNone, kDefault, kQuantised };
 
 struct Cache {
-  std::vector<std::string> fields;  // position, velocity, solids
+  std::vector<std::string> fields;  // position, velocity, elongation, solids
   Compression compression;
   double error;  // [m] largest position error of `quantised`
 };

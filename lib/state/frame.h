@@ -43,9 +43,10 @@ using Figures = std::vector<std::pair<std::string, double>>;
 
 struct Frame {
   int number = 0;
-  double time = 0;              // [s] after the first frame
-  std::vector<float> position;  // [particles * 3] scene units
-  std::vector<float> velocity;  // [particles * 3] scene units per second; empty: not asked for
+  double time = 0;                // [s] after the first frame
+  std::vector<float> position;    // [particles * 3] scene units
+  std::vector<float> velocity;    // [particles * 3] scene units per second; empty: not asked for
+  std::vector<float> elongation;  // [particles] that non-Hookean integrity remembers; empty: not asked for
   std::vector<std::vector<float>> surface_vertices;  // as RunHeader::surfaces, [vertices * 3]
   Figures figures;
 };

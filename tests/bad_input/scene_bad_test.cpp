@@ -30,8 +30,9 @@ constexpr Case kSchemaCases[] = {
      "last?)"},
     {R"({"limits": {"temperature": 5}})",
      "scene#/limits/temperature: found an unknown key, expected one of edge_strain, speed"},
-    {R"({"effects": {"wind": {"velocity": [4, 0, 1]}}})",
-     "scene#/effects/wind: found an unknown key, expected one of collision, gravity, inextensible, solids"},
+    {R"({"effects": {"smoke": {}}})",
+     "scene#/effects/smoke: found an unknown key, expected one of collision, gravity, inextensible, "
+     "non_hookean, solids, wind"},
     {R"({"units": {"a/b~c": 1}})", "scene#/units/a~1b~0c: found an unknown key, expected one of length, up"},
     // type
     {R"({"frames": 24})", "scene#/frames: found 24, expected an object"},
@@ -73,7 +74,7 @@ constexpr Case kSchemaCases[] = {
     {R"({"effects": {"gravity": [0, "down", 0]}})",
      R"(scene#/effects/gravity/1: found "down", expected a number from -1e+06 to 1e+06 [m/s^2])"},
     {R"({"cache": {"fields": ["position", "position"]}})",
-     R"(scene#/cache/fields: found ["position","position"], expected a list, different, each "position", "velocity" or "solids")"},
+     R"(scene#/cache/fields: found ["position","position"], expected a list, different, each "position", "velocity", "elongation" or "solids")"},
     // if/then/else
     {R"({"groom": 5})", "scene#/groom: found 5, expected an object, or a list of at least 1, each an object"},
     {R"({"groom": [{"file": "a.hair", "attach": "glue"}]})",
@@ -154,6 +155,22 @@ constexpr Case kMeaningCases[] = {
      "scene#/groom/stiffness/0/curve/1/0: found 1.5, expected a position from 0 (root) to 1 (tip)"},
     {R"({"groom": [{"file": "a.hair", "attach": "fixed"}, {"file": "b.hair", "name": "a", "attach": "fixed"}]})",
      R"(scene#/groom/1/name: found "a", expected a name other than that of /groom/0)"},
+    // non-Hookean integrity
+    {R"({"effects": {"non_hookean": {"curve": [[0.5, 0.4]]}}})",
+     "scene#/effects/non_hookean/curve/0/1: found 0.4, expected the first point on Hooke's line, 0.5"},
+    {R"({"effects": {"non_hookean": {"curve": [[0.5, 0.5], [0.5, 0.6], [0.7, 0.55]]}}})",
+     "scene#/effects/non_hookean/curve/1/0: found 0.5, expected an elongation after the previous point's "
+     "0.5\n"
+     "scene#/effects/non_hookean/curve/2/1: found 0.55, expected a tension not under the previous point's "
+     "0.6 "
+     "(the curve must not fall)"},
+    // wind
+    {R"({"effects": {"wind": {}}})",
+     "scene#/effects/wind: found neither velocity nor keys, expected one of them, or both"},
+    {R"({"effects": {"wind": {"keys": [{"frame": 2, "velocity": [1, 0, 0]}, {"frame": 1, "velocity": [1, 0, 0]}]}}})",
+     "scene#/effects/wind/keys/1/frame: found 1.0, expected a frame after the previous key's 2.0"},
+    {R"({"effects": {"wind": {"velocity": [0, 1, 0], "shelter": {}}}})",
+     "scene#/effects/wind/shelter: found shelter without a head, expected a head in the scene"},
     // solids
     {R"({"effects": {"solids": [{"source": "head"}]}})",
      R"(scene#/effects/solids/0/source: found "head" without a head, expected a head in the scene, or a mesh file)"},
@@ -162,6 +179,8 @@ constexpr Case kMeaningCases[] = {
     {R"({"effects": {"solids": [{"source": "sphere.obj"}, {"source": "./sphere.obj"}]}})",
      R"(scene#/effects/solids/1/name: found "sphere", expected a name other than that of /effects/solids/0)"},
     // cache
+    {R"({"cache": {"fields": ["position", "elongation"]}})",
+     R"(scene#/cache/fields: found "elongation", expected none without effects.non_hookean)"},
     {R"({"cache": {"fields": ["velocity"]}})",
      R"(scene#/cache/fields: found ["velocity"], expected a list with "position")"},
     // several at once

@@ -149,10 +149,53 @@ TEST_F(SceneLoad, ReadsSolids) {
   EXPECT_FALSE(own.effects.solids[0].is_head) << "a file called head";
 }
 
+TEST_F(SceneLoad, ReadsTheNonHookeanCurve) {
+  const NonHookean n = load_json(full()).effects.non_hookean.value();
+  EXPECT_EQ(n.memory, Memory::kReversible);
+  EXPECT_EQ(n.curve, (Curve{{0.25, 0.25}, {0.5, 0.375}}));
+}
+
+TEST_F(SceneLoad, ReadsWind) {
+  const Wind w = load_json(full()).effects.wind.value();
+  ASSERT_EQ(w.keys.size(), 2u);
+  EXPECT_EQ(w.keys[0].frame, 1);
+  EXPECT_EQ(w.keys[0].velocity, Vec3(2, 2, 3));  // m/s, although the scene is in centimetres
+  EXPECT_EQ(w.keys[1].velocity, Vec3(1, 0, 0));
+  EXPECT_EQ(w.gusts->strength, 0.25);
+  EXPECT_EQ(w.gusts->period, 3);
+  EXPECT_EQ(w.gusts->seed, 5);
+  EXPECT_EQ(w.turbulence->strength, 0.5);
+  EXPECT_EQ(w.turbulence->scale, 0.2);
+  EXPECT_EQ(w.turbulence->octaves, 2);
+  EXPECT_EQ(w.turbulence->seed, 6);
+  EXPECT_EQ(w.normal.linear, 1e-4);
+  EXPECT_EQ(w.normal.quadratic, 2e-5);
+  EXPECT_EQ(w.tangential.linear, 3e-4);
+  EXPECT_EQ(w.tangential.quadratic, 4e-5);
+  EXPECT_EQ(w.linear_density, 1e-5);
+  EXPECT_EQ(w.shelter->strength, 0.5);
+  EXPECT_EQ(w.shelter->wake, 0.3);
+  const Wind constant = *load_json(minimal(), {"/effects/wind/velocity=[4,0,1]"}).effects.wind;
+  ASSERT_EQ(constant.keys.size(), 1u);
+  EXPECT_EQ(constant.keys[0].velocity, Vec3(4, 0, 1));
+}
+
+TEST_F(SceneLoad, TakesAWindThatNeverBlowsForNone) {
+  EXPECT_FALSE(
+      load_json(minimal(), {"/effects/wind={\"velocity\": [0, 0, 0], \"turbulence\": {}}"}).effects.wind);
+  EXPECT_FALSE(load_json(minimal(), {R"(/effects/wind={"keys": [{"frame": 1, "velocity": [0, 0, 0]}]})"})
+                   .effects.wind);
+  EXPECT_TRUE(load_json(minimal(), {R"(/effects/wind={"keys": [{"frame": 1, "velocity": [0, 0, 0]},
+                                                               {"frame": 2, "velocity": [0, 1, 0]}]})"})
+                  .effects.wind);
+}
+
 TEST_F(SceneLoad, RunsNoEffectThatIsAbsent) {
   const Scene s = load_json(minimal());
   EXPECT_FALSE(s.effects.gravity);
   EXPECT_FALSE(s.effects.inextensible);
+  EXPECT_FALSE(s.effects.non_hookean);
+  EXPECT_FALSE(s.effects.wind);
   EXPECT_TRUE(s.effects.solids.empty());
   EXPECT_FALSE(s.head);
 }
@@ -192,14 +235,16 @@ TEST_F(SceneLoad, FillsInExactlyTheSchemasDefaults) {
     "head": {"mesh": "head.obj", "animation": {"keys": [{"frame": 1}]}},
     "groom": [{"file": "a.hair", "stiffness": [{"curve": [[0, 1]]}]}, {"grow": {"strands_per_triangle": 1}},
               {"file": "b.hair", "attach": "fixed"}, {"name": "few", "grow": {"strands": 5}}],
-    "effects": {"inextensible": {}, "solids": [{"source": "head"}]}})"));
+    "effects": {"inextensible": {}, "non_hookean": {}, "solids": [{"source": "head"}],
+                "wind": {"velocity": [1, 0, 0], "gusts": {}, "turbulence": {}, "shelter": {}}}})"));
   const Key& key = s.head->animation.keys[0];
   const Groom& groom = s.grooms[0];
   const Grow& grow = *s.grooms[1].grow;
   const Solid& solid = s.effects.solids[0];
+  const Wind& wind = *s.effects.wind;
   const auto is = [](auto value, auto expected) { return value == expected; };
   const auto word = [](bool right, const char* name) { return right ? Json(name) : Json("another word"); };
-  const std::string props = "/properties/", defs = "/definitions/";
+  const std::string props = "/properties/", defs = "/definitions/", air = "/definitions/wind/properties/";
   const std::vector<DefaultCase> cases = {
       {props + "frames/properties/first", "/frames/first", s.frames.first},
       {props + "frames/properties/fps", "/frames/fps", s.frames.fps},
@@ -208,6 +253,27 @@ TEST_F(SceneLoad, FillsInExactlyTheSchemasDefaults) {
       {props + "units/properties/up", "/units/up", word(is(s.units.up, Axis::kY), "y")},
       {props + "effects/properties/collision/properties/iterations", "/effects/collision/iterations",
        s.effects.collision.iterations},
+      {defs + "non_hookean/properties/memory", "/effects/non_hookean/memory",
+       word(is(s.effects.non_hookean->memory, Memory::kPermanent), "permanent")},
+      {defs + "non_hookean/properties/curve", "/effects/non_hookean/curve", s.effects.non_hookean->curve},
+      {air + "gusts/properties/strength", "/effects/wind/gusts/strength", wind.gusts->strength},
+      {air + "gusts/properties/period", "/effects/wind/gusts/period", wind.gusts->period},
+      {air + "gusts/properties/seed", "/effects/wind/gusts/seed", wind.gusts->seed},
+      {air + "turbulence/properties/strength", "/effects/wind/turbulence/strength",
+       wind.turbulence->strength},
+      {air + "turbulence/properties/scale", "/effects/wind/turbulence/scale", wind.turbulence->scale},
+      {air + "turbulence/properties/octaves", "/effects/wind/turbulence/octaves", wind.turbulence->octaves},
+      {air + "turbulence/properties/seed", "/effects/wind/turbulence/seed", wind.turbulence->seed},
+      {air + "normal_drag/properties/linear", "/effects/wind/normal_drag/linear", wind.normal.linear},
+      {air + "normal_drag/properties/quadratic", "/effects/wind/normal_drag/quadratic",
+       wind.normal.quadratic},
+      {air + "tangential_drag/properties/linear", "/effects/wind/tangential_drag/linear",
+       wind.tangential.linear},
+      {air + "tangential_drag/properties/quadratic", "/effects/wind/tangential_drag/quadratic",
+       wind.tangential.quadratic},
+      {air + "linear_density", "/effects/wind/linear_density", wind.linear_density},
+      {air + "shelter/properties/strength", "/effects/wind/shelter/strength", wind.shelter->strength},
+      {air + "shelter/properties/wake", "/effects/wind/shelter/wake", wind.shelter->wake},
       {props + "limits/properties/edge_strain", "/limits/edge_strain", s.limits.edge_strain},
       {props + "limits/properties/speed", "/limits/speed", s.limits.speed},
       {props + "cache/properties/fields", "/cache/fields", s.cache.fields},
@@ -499,6 +565,7 @@ TEST_F(SceneLoad, KnowsEveryWordOfTheSchema) {
       {"/definitions/model/properties/angular_tangent/enum", "/model/angular_tangent"},
       {"/definitions/model/properties/integrity_tangent/enum", "/model/integrity_tangent"},
       {"/definitions/inextensible/properties/per/enum", "/effects/inextensible/per"},
+      {"/definitions/non_hookean/properties/memory/enum", "/effects/non_hookean/memory"},
       {"/properties/cache/properties/compression/enum", "/cache/compression"},
   };
   for (const auto& [in_schema, in_scene] : words)

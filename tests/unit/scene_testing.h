@@ -100,6 +100,15 @@ class SceneTest : public testing::Test {
       "effects": {
         "gravity": [0, 0, -9.81],
         "inextensible": {"tolerance": 1e-3, "max_iterations": 5, "per": "frame"},
+        "non_hookean": {"memory": "reversible", "curve": [[0.25, 0.25], [0.5, 0.375]]},
+        "wind": {
+          "velocity": [1, 0, 0],
+          "keys": [{"frame": 1, "velocity": [1, 2, 3]}, {"frame": 9, "velocity": [0, 0, 0]}],
+          "gusts": {"strength": 0.25, "period": 3, "seed": 5},
+          "turbulence": {"strength": 0.5, "scale": 20, "octaves": 2, "seed": 6},
+          "normal_drag": {"linear": 1e-4, "quadratic": 2e-5}, "tangential_drag": {"linear": 3e-4, "quadratic": 4e-5},
+          "linear_density": 1e-5, "shelter": {"strength": 0.5, "wake": 30}
+        },
         "solids": [
           {"source": "head", "proxy": "proxy.obj", "friction": 0.3, "offset": 0.1, "voxel": 0.2, "resolution": 64,
            "half_width": 4, "level_set_cache": "levels"},

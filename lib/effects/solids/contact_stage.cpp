@@ -32,7 +32,7 @@ class ContactStage : public Stage<T> {
     for (const solids::Solid& solid : solids_) total += solid.bytes();
     return total;
   }
-  int launches() const override { return 1; }
+  std::int64_t launches() const override { return scene_.model.substeps; }
   std::int64_t diverged_strand() const override { return diverged_; }
 
   void run(Executor<T>& executor, const Substep& substep, FrameReport& report) override {

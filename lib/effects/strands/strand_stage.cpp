@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "effects/strands/tension_curve.h"
+
 namespace ringlet::effects {
 
 using kernels::kLanes;
@@ -34,6 +36,20 @@ kernels::StrandParameters<T> strand_parameters(const scene::Scene& scene) {
 
 namespace {
 
+// The drag law of the scene's wind, without the air.
+template <class T>
+kernels::Air<T> drag_law(const scene::Scene& scene) {
+  kernels::Air<T> air{};
+  if (!scene.effects.wind) return air;
+  const scene::Wind& wind = *scene.effects.wind;
+  const double per_density = 1 / (wind.linear_density * scene.model.particle_mass);
+  air.normal[0] = static_cast<T>(wind.normal.linear * per_density);
+  air.normal[1] = static_cast<T>(wind.normal.quadratic * per_density);
+  air.tangential[0] = static_cast<T>(wind.tangential.linear * per_density);
+  air.tangential[1] = static_cast<T>(wind.tangential.quadratic * per_density);
+  return air;
+}
+
 template <class T>
 class StrandStage : public Stage<T> {
  public:
@@ -44,11 +60,18 @@ class StrandStage : public Stage<T> {
         lengths_at_frame_end_(scene.effects.inextensible &&
                               scene.effects.inextensible->cadence == scene::Cadence::kFrame),
         substeps_(scene.model.substeps),
-        figures_(static_cast<std::size_t>(model.layout.batches()) * kernels::kFigures * kLanes) {}
+        air_(drag_law<T>(scene)),
+        figures_(static_cast<std::size_t>(model.layout.batches()) * kernels::kFigures * kLanes) {
+    if (const auto& softening = scene.effects.non_hookean) {
+      state_.elongation.assign(state_.position.size() / 3, T(0));
+      elongation_ = {nullptr, tension_curve<T>(softening->curve),
+                     softening->memory == scene::Memory::kPermanent};
+    }
+  }
 
   std::string name() const override { return "strands"; }
   std::size_t bytes() const override { return model_.bytes() + state_.bytes() + figures_.size() * sizeof(T); }
-  int launches() const override { return 1; }
+  std::int64_t launches() const override { return substeps_; }
   std::int64_t diverged_strand() const override { return diverged_; }
 
   void run(Executor<T>& executor, const Substep& substep, FrameReport& report) override {
@@ -57,6 +80,9 @@ class StrandStage : public Stage<T> {
     step.parameters.step = static_cast<T>(substep.step);
     if (lengths_at_frame_end_ && !substep.last_of_frame) step.parameters.length_iterations = 0;
     if (lengths_at_frame_end_) step.parameters.skipped_substeps = substeps_ - 1;
+    step.elongation = elongation_, step.air = air_;
+    if (!state_.elongation.empty()) step.elongation.memory = state_.elongation.data();
+    if (!state_.air.empty()) step.air.velocity = state_.air.data();
     executor.strand_step(step);
     gather(report);
   }
@@ -85,6 +111,8 @@ class StrandStage : public Stage<T> {
   kernels::StrandParameters<T> parameters_;
   bool lengths_at_frame_end_;
   int substeps_;  // a frame
+  kernels::Elongation<T> elongation_{};
+  kernels::Air<T> air_;
   state::AlignedVector<T> figures_;
   std::int64_t diverged_ = -1;
 };

@@ -133,14 +133,33 @@ class StrandRun {
     return values;
   }
 
+  // Integrity follows this curve from now on.
+  void soften(const kernels::TensionCurve<T>& curve, bool permanent) {
+    state.elongation.assign(state.position.size() / 3, T(0));
+    elongation = {state.elongation.data(), curve, permanent};
+  }
+  double remembered(std::size_t strand, int particle) const {
+    return state.elongation[model.layout.at(strand, particle, 1, 0)];
+  }
+  // The same wind [m/s] at every segment from now on; coefficients as kernels::Air.
+  void blow(const Vec3& wind, const kernels::Air<T>& law) {
+    state.air.assign(state.position.size(), T(0));
+    for (std::size_t strand = 0; strand < poses_.size(); ++strand)
+      for (int i = 0; i < model.layout.count(strand); ++i)
+        for (int c = 0; c < 3; ++c) state.air[model.layout.at(strand, i, 3, c)] = static_cast<T>(wind[c]);
+    air = law;
+    air.velocity = state.air.data();
+  }
+
   // One substep to the given root poses, `at_a_time` batches a call (0: all in one).
   void step(const std::vector<RootPose>& after, double h, int at_a_time = 0) {
     for (std::size_t strand = 0; strand < poses_.size(); ++strand)
       state::set_root_motion<T>(state, model.layout, strand, {poses_[strand].rotation, poses_[strand].root},
                                 {after[strand].rotation, after[strand].root});
     parameters.step = static_cast<T>(h);
-    const kernels::StrandStep<T> step{model.view(), state.view(), state.root_motion.data(), parameters,
-                                      figures.data()};
+    kernels::StrandStep<T> step{model.view(), state.view(), state.root_motion.data(), parameters,
+                                figures.data()};
+    step.elongation = elongation, step.air = air;
     const int batches = model.layout.batches(), piece = at_a_time > 0 ? at_a_time : batches;
     for (int begin = 0; begin < batches; begin += piece)
       Machine::kernels().strand_step(step, begin, std::min(begin + piece, batches), scratch.data());
@@ -181,12 +200,15 @@ class StrandRun {
   kernels::StrandParameters<T> parameters{};
   std::int32_t home = -1;          // the solid that strands grow on, as ContactStep has it
   std::vector<std::int32_t> skin;  // [strands], or empty
+  kernels::Elongation<T> elongation{};
+  kernels::Air<T> air{};
   state::AlignedVector<T> figures, contact_figures, scratch;
 
  private:
   static state::StrandInput input_of(const std::vector<oracle::Strand>& strands,
                                      const std::vector<RootPose>& poses, bool preload) {
     state::StrandInput input;
+    input.elongation = true;
     const auto or_zero = [](const std::vector<double>& values, int i) {
       return i < static_cast<int>(values.size()) ? static_cast<float>(values[i]) : 0.0f;
     };

@@ -45,6 +45,8 @@ class KernelBits : public OnMachine<Machine> {
     strands[0].drag = 1, strands[0].damping = 1.0 / 60;  // for all
     StrandRun<On> run(strands, poses, true);
     run.parameters.length_iterations = 3;
+    run.soften({1, 0.01, 0.2, {0.01}, {{0.01, 1, -2, 0}}}, true);
+    run.blow({3, 1, -2}, {nullptr, {40, 9}, {20, 1}});
     for (std::size_t k = 0; k < which.size(); ++k) run.set(k, crowd.states[which[k]]);
     for (int step = 1; step <= kSteps; ++step) {
       for (std::size_t k = 0; k < which.size(); ++k) poses[k] = crowd.pose(which[k], step);

@@ -3,8 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <set>
 
+#include "kernels/launch/launch.h"
 #include "parity/cuda_sphere.h"
 #include "parity/cuda_support.h"
 
@@ -86,6 +88,46 @@ TEST(CudaThreads, StepAsTheLanesDo) {
   EXPECT_EQ(lanes.state.position, threads.state.position);
   EXPECT_EQ(lanes.state.velocity, threads.state.velocity);
   EXPECT_EQ(lanes.strand_figures, threads.strand_figures);
+}
+
+TEST(CudaThreads, BlowAndShelterAsTheKernelsOfTheProcessorDo) {
+  const StrandParameters<float> parameters = default_parameters();
+  HostGroom groom(mixed_strands(70, 2));
+  groom.move_roots(parameters.step);
+  groom.step(parameters);
+  const std::vector<float> front(12, 0.0f), rear(12, 0.1f);
+  state::AlignedVector<float> exposure(groom.state.position.size() / 3, 1.0f), other_exposure = exposure;
+  state::AlignedVector<float> air(groom.state.position.size()), other_air = air;
+  ShelterStep<float> shelter{
+      groom.model.view(),
+      groom.state.position.data(),
+      groom.state.root_points.data(),
+      {{-0.1, -0.1, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, 10, 4, 3, front.data(), rear.data()},
+      0.9f,
+      5,
+      exposure.data()};
+  WindStep<float> wind{
+      groom.model.view(),
+      groom.state.position.data(),
+      groom.state.root_points.data(),
+      {{1, 2, 3}, 2, {{1, 2, 0}, {0, 1, 3}}, {{2, -1, 0}, {1, 0, 0}}, {0.1f, 0.7f}, {0, 0, 0}},
+      exposure.data(),
+      air.data()};
+  run_threads(groom, [&](WarpScratch) { return ShelterStepThread{shelter}; });
+  run_threads(groom, [&](WarpScratch) { return WindStepThread{wind}; });
+  shelter.exposure = other_exposure.data(), wind.exposure = other_exposure.data(),
+  wind.air = other_air.data();
+  const auto& kernels = cpu_kernels<float>(best_instruction_set());
+  kernels.shelter_step(shelter, 0, groom.model.layout.batches(), nullptr);
+  kernels.wind_step(wind, 0, groom.model.layout.batches(), nullptr);
+  EXPECT_EQ(exposure, other_exposure);
+  EXPECT_NE(std::count_if(exposure.begin(), exposure.end(), [](float e) { return e < 1; }), 0);
+  if (best_instruction_set() == InstructionSet::kGeneric) GTEST_SKIP() << "no fused multiply-add here";
+  const state::StrandLayout& layout = groom.model.layout;
+  for (std::size_t s = 0; s < layout.strands(); ++s)
+    for (int i = 0; i + 1 < layout.count(s); ++i)
+      for (int c = 0; c < 3; ++c)
+        EXPECT_EQ(air[layout.at(s, i, 3, c)], other_air[layout.at(s, i, 3, c)]) << s << " " << i;
 }
 
 TEST(CudaThreads, CollideAsTheLanesDo) {

@@ -41,7 +41,7 @@ WindField::WindField(const scene::Wind& wind, const scene::Frames& frames, const
 
 // Four sines of incommensurate rates about one a period; together at most `strength`.
 void WindField::make_gusts(const scene::Gusts& gusts) {
-  constexpr double kShare[] = {0.4, 0.3, 0.2, 0.1}, kRate[] = {1, 1.6180339887, 0.6457513110, 2.6457513110};
+  constexpr double kShare[] = {0.4, 0.3, 0.2, 0.1}, kRate[] = {1, 1.4142135624, 0.7320508076, 2.4494897428};
   Random random(static_cast<std::uint64_t>(gusts.seed), 0);
   for (int k = 0; k < 4; ++k)
     gusts_.push_back({gusts.strength * kShare[k], kTurn * kRate[k] / gusts.period, kTurn * random.uniform()});

@@ -1,0 +1,181 @@
+// Non-Hookean integrity: the curve, its secant in the kernels' step, its memory.
+#include <gtest/gtest.h>
+
+#include "effects/strands/tension_curve.h"
+#include "kernels/strand/elongation.h"
+#include "kernels_support.h"
+#include "oracle/helix.h"
+#include "oracle/random_strand.h"
+
+namespace ringlet::kernels_testing {
+namespace {
+
+const scene::Curve kDefault = {{0.5, 0.5}, {0.75, 0.65}, {1.0, 0.7}};
+const scene::Curve kStraight = {{0.002, 0.002}, {0.02, 0.02}, {1e6, 1e6}};
+
+double secant_of(const scene::Curve& points, double e) {
+  return kernels::secant(effects::tension_curve<double>(points), e);
+}
+
+TEST(TensionCurve, IsHookesLineUpToTheTransitionExactly) {
+  for (const double e : {0.0, 1e-12, 0.1, 0.3333, 0.5}) EXPECT_EQ(secant_of(kDefault, e), 1.0);
+}
+
+TEST(TensionCurve, PassesThroughItsPointsAndBreaksAtTheLast) {
+  EXPECT_NEAR(secant_of(kDefault, 0.75), 0.65 / 0.75, 1e-15);
+  EXPECT_NEAR(secant_of(kDefault, 1 - 1e-12), 0.7, 1e-11);
+  EXPECT_EQ(secant_of(kDefault, 1.0), 0.0);
+  EXPECT_EQ(secant_of(kDefault, 50), 0.0);
+  EXPECT_EQ(secant_of({{0.5, 0.5}}, 0.5), 1.0);
+  EXPECT_EQ(secant_of({{0.5, 0.5}}, 0.500001), 0.0);
+  EXPECT_TRUE(std::isnan(secant_of(kDefault, std::nan(""))));
+}
+
+TEST(TensionCurve, NeverFallsAndHasNoKinkBeforeTheBreak) {
+  const scene::Curve curves[] = {kDefault, {{0.1, 0.1}, {0.2, 0.1}, {0.3, 0.9}, {0.31, 0.9}, {2, 1}}};
+  for (const scene::Curve& points : curves) {
+    const double end = points.back()[0], step = end / 20000;
+    double before = 0, slope_before = 1;
+    for (double e = step; e < end; e += step) {
+      const double tension = e * secant_of(points, e), slope = (tension - before) / step;
+      EXPECT_GE(tension, before - 1e-14) << e;
+      if (&points == &curves[0]) {
+        EXPECT_NEAR(slope, slope_before, 0.01) << e;
+      }
+      before = tension, slope_before = slope;
+    }
+  }
+}
+
+TEST(TensionCurve, ThroughPointsOfALineIsTheLine) {
+  for (const double e : {0.003, 0.01, 0.02, 0.31, 2.0, 1e3}) EXPECT_NEAR(secant_of(kStraight, e), 1, 1e-12);
+}
+
+template <class Machine>
+class KernelElongation : public OnMachine<Machine> {
+ protected:
+  using T = typename Machine::T;
+
+  // A helix shaken so far that particles are out by most of `reach` times its length, every step seen by
+  // `watch`.
+  template <class Watch>
+  static oracle::State shake(const scene::Curve* curve, bool permanent, double amplitude, int steps,
+                             const Watch& watch) {
+    const oracle::Strand strand = oracle::helix_strand({});
+    StrandRun<Machine> run({strand}, {RootPose{}}, true);
+    if (curve) run.soften(effects::tension_curve<T>(*curve), permanent);
+    for (int step = 1; step <= steps; ++step) {
+      RootPose pose;
+      const double t = std::min(step, 120) / 240.0;  // half a second of motion, then rest
+      pose.root.z() = amplitude * (1 - std::cos(2 * std::numbers::pi * 2 * t));
+      run.step({pose}, 1.0 / 240);
+      watch(run);
+    }
+    return run.get(0);
+  }
+  static void ignore(const StrandRun<Machine>&) {}
+  static double largest(const StrandRun<Machine>& run) {
+    double most = 0;
+    for (int i = 0; i < run.model.layout.count(0); ++i) most = std::max(most, run.remembered(0, i));
+    return most;
+  }
+};
+TYPED_TEST_SUITE(KernelElongation, Machines, MachineNames);
+
+TYPED_TEST(KernelElongation, BelowTheTransitionChangesNoBit) {
+  double most = 0;
+  const auto hookean = this->shake(nullptr, true, 0.02, 240, this->ignore);
+  const auto soft =
+      this->shake(&kDefault, true, 0.02, 240, [&](const auto& run) { most = this->largest(run); });
+  EXPECT_TRUE(most > 0.01 && most < 0.5) << most;
+  EXPECT_TRUE(soft.position == hookean.position && soft.velocity == hookean.velocity);
+}
+
+TYPED_TEST(KernelElongation, OnAStraightCurveIsHookean) {
+  double most = 0;
+  const auto hookean = this->shake(nullptr, false, 0.1, 60, this->ignore);
+  const auto soft =
+      this->shake(&kStraight, false, 0.1, 60, [&](const auto& run) { most = this->largest(run); });
+  EXPECT_GT(most, 0.03);  // well above the transition
+  const double apart = (soft.position - hookean.position).cwiseAbs().maxCoeff();
+  EXPECT_TRUE(apart <= 1e-6) << apart;
+}
+
+TYPED_TEST(KernelElongation, PermanentDamageNeverHealsAndReversibleDoes) {
+  std::vector<double> before(30, 0);
+  double most = 0;
+  const auto damaged = this->shake(&kDefault, true, 0.6, 720, [&](const auto& run) {
+    for (int i = 0; i < 30; ++i) {
+      const double now = run.remembered(0, i);
+      EXPECT_TRUE(now >= before[i]) << "particle " << i;
+      before[i] = now;
+    }
+    most = this->largest(run);
+    EXPECT_TRUE(run.get(0).position.allFinite());
+    EXPECT_TRUE(run.figure(0, kernels::kSpeed) < 100);
+  });
+  EXPECT_GT(most, 1.0);  // some broke
+  double last = 1;
+  const auto healed =
+      this->shake(&kDefault, false, 0.6, 1440, [&](const auto& run) { last = this->largest(run); });
+  EXPECT_LT(last, 0.5);  // back on Hooke's line
+  const oracle::Strand strand = oracle::helix_strand({});
+  const oracle::Points rest = oracle::rest_state(strand).position;
+  const auto deviation = [&](const oracle::State& state) {
+    return (state.position - rest).colwise().norm().maxCoeff();
+  };
+  EXPECT_GT(deviation(damaged), 2 * deviation(healed)) << deviation(damaged) << " " << deviation(healed);
+}
+
+TYPED_TEST(KernelElongation, ShortStrandsDoNotBreakAtRest) {
+  for (const double size : {0.002, 0.02, 0.2, 2.0}) {  // the preload's ghosts are 98 mm away
+    oracle::Strand strand = oracle::helix_strand({});
+    strand.rest *= size;
+    oracle::preload_gravity(strand);
+    StrandRun<TypeParam> run({strand}, {RootPose{}}, true);
+    run.soften(effects::tension_curve<typename TypeParam::T>(kDefault), true);
+    for (int step = 0; step < 200; ++step) run.step({RootPose{}}, 1.0 / 240);
+    EXPECT_TRUE(this->largest(run) < 1e-3) << size << ": " << this->largest(run);
+  }
+}
+
+// One step at elongations all along the curve, the break included: the dense system whose integrity stiffness
+// is the secant's.
+TYPED_TEST(KernelElongation, SolvesTheReferencesSystemWithTheSecantStiffness) {
+  std::mt19937 generator(4);
+  for (int trial = 0; trial < 24; ++trial) {
+    oracle::RandomStrand random = oracle::random_strand(generator, 3 + trial % 20, 1);
+    random.strand = rounded<typename TypeParam::T>(random.strand);
+    random.strand.preload.setZero();
+    oracle::preload_gravity(random.strand, random.step.before);
+    if (trial & 1) random.strand.integrity_tangent = oracle::IntegrityTangent::kPaper;
+    StrandRun<TypeParam> run({random.strand}, {random.step.before}, true);
+    run.set(0, random.state);
+    random.state = run.get(0);
+    random.step.h = static_cast<typename TypeParam::T>(random.step.h);
+    const scene::Curve curve = {{0.01, 0.01}, {0.02, 0.015}, {0.05, 0.02}};
+    run.soften(effects::tension_curve<typename TypeParam::T>(curve), false);
+
+    double length = 0;
+    for (int i = 1; i < random.strand.size(); ++i)
+      length += (random.strand.rest.col(i) - random.strand.rest.col(i - 1)).norm();
+    const oracle::Points y = oracle::ghost(random.strand, random.step.before);
+    oracle::Strand softened = random.strand;
+    int soft = 0;
+    for (int i = 0; i < softened.size(); ++i) {
+      const double e = (random.state.position.col(i) - y.col(i)).norm() / length;
+      softened.integrity[i] *= secant_of(curve, e);
+      soft += e > 0.01;
+    }
+    EXPECT_GT(soft, 0);
+    const oracle::LinearSystem system = assemble(softened, random.state, random.step);
+    EXPECT_GT(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(system.matrix).eigenvalues().minCoeff(), 0);
+    run.step({random.step.after}, random.step.h);
+    const Eigen::VectorXd solution = run.get(0).velocity.rightCols(softened.size() - 1).reshaped();
+    const double backward = oracle::backward_error(system, solution);
+    EXPECT_TRUE(backward <= this->either(1e-13, 2e-6)) << backward;
+  }
+}
+
+}  // namespace
+}  // namespace ringlet::kernels_testing

@@ -82,6 +82,8 @@ oracle::Strand rounded(oracle::Strand strand) {
   return strand;
 }
 
+enum class Springs { kAms, kMassSpring };
+
 // Strands of unit mass and their state. The options of the first strand (gravity, drag, damping, clamped
 // particles, tangents) hold for all; lengths are left alone until `parameters` says otherwise.
 template <class Machine>
@@ -90,8 +92,9 @@ class StrandRun {
   using T = typename Machine::T;
 
   // At rest on the ghosts of `poses`, which the preload (if any) is taken against.
-  StrandRun(const std::vector<oracle::Strand>& strands, std::vector<RootPose> poses, bool preload)
-      : model(input_of(strands, poses, preload)), state(model.layout), poses_(std::move(poses)) {
+  StrandRun(const std::vector<oracle::Strand>& strands, std::vector<RootPose> poses, bool preload,
+            Springs springs = Springs::kAms)
+      : model(input_of(strands, poses, preload, springs)), state(model), poses_(std::move(poses)) {
     const oracle::Strand& first = strands.front();
     parameters.gravity[0] = static_cast<T>(first.gravity.x());
     parameters.gravity[1] = static_cast<T>(first.gravity.y());
@@ -130,6 +133,22 @@ class StrandRun {
         values.position(c, i) = state.position[at], values.velocity(c, i) = state.velocity[at];
       }
     values.position.colwise() += poses_[strand].root;
+    return values;
+  }
+
+  // The mass-spring chain of the first strand, hair and companions in turn.
+  void set_chain(const oracle::State& values) {
+    for_chain([&](int node, T* position, T* velocity, int c) {
+      *position = static_cast<T>(values.position(c, node) - poses_[0].root[c]);
+      *velocity = static_cast<T>(values.velocity(c, node));
+    });
+  }
+  oracle::State get_chain() {
+    const int nodes = 2 * model.layout.count(0) - 1;
+    oracle::State values{oracle::Points(3, nodes), oracle::Points(3, nodes)};
+    for_chain([&](int node, const T* position, const T* velocity, int c) {
+      values.position(c, node) = *position + poses_[0].root[c], values.velocity(c, node) = *velocity;
+    });
     return values;
   }
 
@@ -205,9 +224,19 @@ class StrandRun {
   state::AlignedVector<T> figures, contact_figures, scratch;
 
  private:
+  template <class Visit>
+  void for_chain(const Visit& visit) {
+    for (int node = 0; node < 2 * model.layout.count(0) - 1; ++node)
+      for (int c = 0; c < 3; ++c) {
+        const std::size_t at = model.layout.at(0, node / 2, 3, c);
+        visit(node, &(node % 2 ? state.companion_position : state.position)[at],
+              &(node % 2 ? state.companion_velocity : state.velocity)[at], c);
+      }
+  }
   static state::StrandInput input_of(const std::vector<oracle::Strand>& strands,
-                                     const std::vector<RootPose>& poses, bool preload) {
+                                     const std::vector<RootPose>& poses, bool preload, Springs springs) {
     state::StrandInput input;
+    input.companions = springs == Springs::kMassSpring;
     input.elongation = true;
     const auto or_zero = [](const std::vector<double>& values, int i) {
       return i < static_cast<int>(values.size()) ? static_cast<float>(values[i]) : 0.0f;

@@ -1,5 +1,6 @@
 # Reference implementations that the kernels are judged by: Eigen and nothing of ours.
 add_library(ringlet_oracle STATIC ${CMAKE_CURRENT_LIST_DIR}/oracle/ams_reference.cpp
+                                  ${CMAKE_CURRENT_LIST_DIR}/oracle/mass_spring_reference.cpp
                                   ${CMAKE_CURRENT_LIST_DIR}/oracle/mesh_distance.cpp)
 add_library(ringlet::oracle ALIAS ringlet_oracle)
 target_include_directories(ringlet_oracle PUBLIC ${CMAKE_CURRENT_LIST_DIR})

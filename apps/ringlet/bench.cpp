@@ -96,7 +96,7 @@ double floor_nanoseconds(const state::StrandModel<float>& model, state::StrandSt
 Row strand_row(const std::string& instruction_set, int threads, int repeats) {
   const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
   const state::StrandModel<float> model(helices());
-  state::StrandState<float> state(model.layout);
+  state::StrandState<float> state(model);
   std::vector<Pose> before(kStrands), after(kStrands);
   state::pose_at_rest<float>(state, model, before);
   const auto executor = effects::make_cpu_executor<float>(model, instruction_set);

@@ -3,7 +3,7 @@
 #include "kernels/backend/pack.h"
 #include "kernels/launch/launch.h"
 #include "kernels/solid/response.h"
-#include "kernels/strand/strand_step.h"
+#include "kernels/strand/strand_models.h"
 #include "kernels/wind/shelter.h"
 #include "kernels/wind/wind_step.h"
 
@@ -14,10 +14,11 @@ namespace {
 template <class R>
 void strand_step(const StrandStep<Scalar<R>>& step, int begin, int end, Scalar<R>* scratch) {
   constexpr int kWidth = Traits<R>::kWidth;
-  with_extras(step, [&](auto extra) {
+  with_strand_model(step, [&](auto model) {
+    using Model = typename decltype(model)::template For<R>;
     for (int batch = begin; batch < end; ++batch)
       for (int lane = 0; lane < kLanes; lane += kWidth)
-        step_strands<decltype(extra), R>(step, batch, lane, scratch, kWidth);
+        step_strands<Model, R>(step, batch, lane, scratch, kWidth);
   });
 }
 

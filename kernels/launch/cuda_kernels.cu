@@ -47,8 +47,11 @@ class Strands final : public CudaStrands {
     preload_.upload(array(model.preload, lanes * 3), stream_.get());
     const std::vector<std::int32_t> begin = scratch_particles(model.row, batches_);
     scratch_begin_.upload(begin, stream_.get());
-    scratch_.resize(std::size_t(begin.back()) * kScratchReals * kWarp);
+    scratch_reals_ = scratch_reals_of(model);
+    scratch_.resize(std::size_t(begin.back()) * scratch_reals_ * kWarp);
     skin_.upload(std::vector<std::int32_t>(lanes, kNoSkin), stream_.get());
+    if (model.rest_companion)
+      rest_companion_.upload(array(model.rest_companion, rows * 3 * kLanes), stream_.get());
     if (model.per_length) per_length_.upload(array(model.per_length, lanes), stream_.get());
     rows_ = rows;
     position_.resize(rows * 3 * kLanes), velocity_.resize(rows * 3 * kLanes);
@@ -60,13 +63,19 @@ class Strands final : public CudaStrands {
   }
 
   void upload_state(const StateArrays<const float>& host) override {
-    if (elongation_.size() != host.elongation.size()) elongation_.resize(host.elongation.size());
+    elongation_.resize(host.elongation.size());
+    companion_position_.resize(host.companion_position.size());
+    companion_velocity_.resize(host.companion_velocity.size());
     send("position", host.position, position_), send("velocity", host.velocity, velocity_);
     send("elongation", host.elongation, elongation_);
+    send("companions", host.companion_position, companion_position_);
+    send("companions", host.companion_velocity, companion_velocity_);
   }
   void download_state(const StateArrays<float>& host) override {
     fetch("position", position_, host.position), fetch("velocity", velocity_, host.velocity);
     fetch("elongation", elongation_, host.elongation);
+    fetch("companions", companion_position_, host.companion_position);
+    fetch("companions", companion_velocity_, host.companion_velocity);
     stream_.synchronize();
   }
   void upload_roots(std::span<const float> motion, std::span<const double> points) override {
@@ -83,8 +92,8 @@ class Strands final : public CudaStrands {
     step.figures = strand_figures_.data();
     if (host.elongation.memory) step.elongation.memory = elongation_.data();
     if (host.air.velocity) step.air.velocity = air_.data();
-    with_extras(step, [&](auto extra) {
-      stream_.parallel_for("strand step", threads(), StrandStepThread<decltype(extra)>{step, scratch()});
+    with_strand_model(step, [&](auto strands) {
+      stream_.parallel_for("strand step", threads(), StrandStepThread<decltype(strands)>{step, scratch()});
     });
   }
   void wind_step(const WindStep<float>& host) override {
@@ -135,7 +144,8 @@ class Strands final : public CudaStrands {
   std::vector<CudaLaunches> launches() override { return stream_.launches(); }
   std::size_t bytes() const override {
     return row_.bytes() + count_.bytes() + rest_.bytes() + rest_length_.bytes() + stiffness_.bytes() +
-           preload_.bytes() + per_length_.bytes() + elongation_.bytes() + air_.bytes() + exposure_.bytes() +
+           preload_.bytes() + per_length_.bytes() + rest_companion_.bytes() + companion_position_.bytes() +
+           companion_velocity_.bytes() + elongation_.bytes() + air_.bytes() + exposure_.bytes() +
            front_.bytes() + rear_.bytes() + position_.bytes() + velocity_.bytes() + root_motion_.bytes() +
            root_points_.bytes() + skin_.bytes() + strand_figures_.bytes() + contact_figures_.bytes() +
            scratch_begin_.bytes() + scratch_.bytes() + solids_.bytes();
@@ -144,11 +154,14 @@ class Strands final : public CudaStrands {
  private:
   int threads() const { return batches_ * kLanes; }
   StrandBatches<float> batches() const {
-    return {batches_,          row_.data(),     count_.data(),     rest_.data(), rest_length_.data(),
-            stiffness_.data(), preload_.data(), per_length_.data()};
+    return {
+        batches_,          row_.data(),     count_.data(),          rest_.data(),      rest_length_.data(),
+        stiffness_.data(), preload_.data(), rest_companion_.data(), per_length_.data()};
   }
-  StrandState<float> state() const { return {position_.data(), velocity_.data()}; }
-  WarpScratch scratch() const { return {scratch_begin_.data(), scratch_.data()}; }
+  StrandState<float> state() const {
+    return {position_.data(), velocity_.data(), companion_position_.data(), companion_velocity_.data()};
+  }
+  WarpScratch scratch() const { return {scratch_begin_.data(), scratch_.data(), scratch_reals_}; }
 
   template <class T>
   void clear(DeviceBuffer<T>& buffer) {
@@ -174,8 +187,10 @@ class Strands final : public CudaStrands {
   std::int32_t batches_;
   DeviceBuffer<std::int32_t> row_;
   std::int64_t rows_ = 0;
-  DeviceBuffer<float> count_, rest_, rest_length_, stiffness_, preload_, per_length_;
-  DeviceBuffer<float> position_, velocity_, elongation_, root_motion_;
+  int scratch_reals_ = 0;
+  DeviceBuffer<float> count_, rest_, rest_length_, stiffness_, preload_, rest_companion_, per_length_;
+  DeviceBuffer<float> position_, velocity_, companion_position_, companion_velocity_, elongation_,
+      root_motion_;
   DeviceBuffer<float> air_, exposure_, front_, rear_;
   DeviceBuffer<std::int32_t> skin_;
   DeviceBuffer<double> root_points_;

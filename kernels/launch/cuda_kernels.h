@@ -62,7 +62,8 @@ struct ContactParameters {
 template <class T>
 struct StateArrays {
   std::span<T> position, velocity;
-  std::span<T> elongation;  // [rows] Elongation::memory
+  std::span<T> elongation = {};                                   // [rows] Elongation::memory
+  std::span<T> companion_position = {}, companion_velocity = {};  // [rows][3] as StrandState
 };
 
 // The strands of a run on the device. Arrays are laid out as on the host (StrandBatches, StrandState,

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "kernels/solid/response.h"
-#include "kernels/strand/strand_step.h"
+#include "kernels/strand/strand_models.h"
 #include "kernels/wind/shelter.h"
 #include "kernels/wind/wind_step.h"
 
@@ -19,8 +19,10 @@ inline constexpr int kWarp = 32;
 inline constexpr int kBatchesPerWarp = kWarp / kLanes;
 static_assert(kWarp % kLanes == 0);
 
-// Values a particle, enough for either step.
-inline constexpr int kScratchReals = kStepReals > kContactReals ? kStepReals : kContactReals;
+// Scratch values a particle, enough for every step of a model.
+inline int scratch_reals_of(const StrandBatches<float>& model) {
+  return std::max(model.rest_companion ? kMassSpringReals : kStepReals, kContactReals);
+}
 
 struct StrandThread {
   int batch, lane;
@@ -38,29 +40,31 @@ inline std::vector<std::int32_t> scratch_particles(const std::int32_t* row, std:
   }
   return begin;
 }
-RINGLET_FUNCTION std::int64_t scratch_offset(int particle, int thread) {
-  return static_cast<std::int64_t>(particle) * kScratchReals * kWarp + thread % kWarp;
+RINGLET_FUNCTION std::int64_t scratch_offset(int particle, int thread, int reals) {
+  return static_cast<std::int64_t>(particle) * reals * kWarp + thread % kWarp;
 }
 
 // Scratch on the device, or wherever the threads run.
 struct WarpScratch {
   const std::int32_t* begin;  // scratch_particles
   float* values;
+  int reals;  // scratch_reals_of the model
 
   RINGLET_FUNCTION float* of(int thread) const {
-    return values + scratch_offset(begin[thread / kWarp], thread);
+    return values + scratch_offset(begin[thread / kWarp], thread, reals);
   }
 };
 
 // The steps, one call a thread.
-template <class Extra>
+template <class Model>
 struct StrandStepThread {
   StrandStep<float> step;
   WarpScratch scratch;
 
   RINGLET_FUNCTION void operator()(int thread) const {
     const StrandThread at = strand_of_thread(thread);
-    step_strands<Extra, float>(step, at.batch, at.lane, scratch.of(thread), kWarp);
+    step_strands<typename Model::template For<float>, float>(step, at.batch, at.lane, scratch.of(thread),
+                                                             kWarp);
   }
 };
 

@@ -22,7 +22,7 @@ struct KernelTable {
 enum class InstructionSet { kGeneric, kAvx2, kAvx512 };
 
 inline std::int64_t scratch_reals(int particles) {
-  return static_cast<std::int64_t>(particles) * kLanes * 40;
+  return static_cast<std::int64_t>(particles) * kLanes * 80;
 }
 
 // The widest set that this processor has.

@@ -30,7 +30,7 @@ struct BandWindow {
   Matrix3<R> below[kBand];               // A_{i+a,i}, a = 1..3
   Symmetric3<R> next_diagonal[kBand];    // A_{i+a,i+a}
   Vector3<R> next_right[kBand];          // b_{i+a}
-  Matrix3<R> next_21, next_31, next_32;  // A_{i+2,i+1}, A_{i+3,i+1}, A_{i+3,i+2}: only fill-in
+  Matrix3<R> next_21, next_31, next_32;  // A_{i+2,i+1}, A_{i+3,i+1}, A_{i+3,i+2}
 
   RINGLET_KERNEL void clear() {
     diagonal = zero_symmetric<R>(), right = zero3<R>();
@@ -56,6 +56,27 @@ struct BandWindow {
     block[6] = block[6] - h.xz, block[7] = block[7] - h.yz, block[8] = block[8] - h.zz;
     diagonal.add(h);
     next_diagonal[a].add(h);
+  }
+  // s (w w^T) x (n n^T) between the particle at hand and the next three.
+  RINGLET_KERNEL void add_rank_one(R s, Vector3<R> n, const R (&weight)[kBand + 1]) {
+    diagonal.add_outer(s * weight[0] * weight[0], n);
+    RINGLET_UNROLL
+    for (int a = 0; a < kBand; ++a) {
+      next_diagonal[a].add_outer(s * weight[a + 1] * weight[a + 1], n);
+      add_outer(below[a], s * weight[a + 1] * weight[0], n);
+    }
+    add_outer(next_21, s * weight[2] * weight[1], n);
+    add_outer(next_31, s * weight[3] * weight[1], n);
+    add_outer(next_32, s * weight[3] * weight[2], n);
+  }
+
+ private:
+  RINGLET_KERNEL static void add_outer(Matrix3<R>& block, R s, Vector3<R> n) {
+    const Vector3<R> b = s * n;
+    R* m = block.m;
+    m[0] = fma(b.x, n.x, m[0]), m[1] = fma(b.x, n.y, m[1]), m[2] = fma(b.x, n.z, m[2]);
+    m[3] = fma(b.y, n.x, m[3]), m[4] = fma(b.y, n.y, m[4]), m[5] = fma(b.y, n.z, m[5]);
+    m[6] = fma(b.z, n.x, m[6]), m[7] = fma(b.z, n.y, m[7]), m[8] = fma(b.z, n.z, m[8]);
   }
 };
 

@@ -28,14 +28,18 @@ struct StrandBatches {
   const T*
       stiffness;     // [rows][kCouplings] [1/s^2], or null where StrandParameters::stiffness holds everywhere
   const T* preload;  // [batches][3] -g in the strand's root frame at the first frame [m/s^2]; 0: no preload
+  const T* rest_companion;  // [rows][3] mass-spring: rest place of the companion of the segment that begins
+                            // there, as `rest` [m]; null for AMS
   const T* per_length;  // [batches] 1 / L, L the strand's rest length, 0 for one without [1/m]; or null where
                         // nothing asks
 };
 
 template <class T>
 struct StrandState {
-  T* position;  // [rows][3] relative to the root point [m]
-  T* velocity;  // [rows][3] in the world [m/s]
+  T* position;                      // [rows][3] relative to the root point [m]
+  T* velocity;                      // [rows][3] in the world [m/s]
+  T* companion_position = nullptr;  // [rows][3] mass-spring: as the two above; else null
+  T* companion_velocity = nullptr;
 };
 
 // Motion of the root frames over one substep, [batches][kRootValues]: rotation at its start (9, row-major;

@@ -134,6 +134,10 @@ struct StrandArrays {
 
   RINGLET_KERNEL Vector3<R> position_at(int i) const { return load3<R>(position + 3 * i * stride, stride); }
   RINGLET_KERNEL Vector3<R> velocity_at(int i) const { return load3<R>(velocity + 3 * i * stride, stride); }
+  RINGLET_KERNEL void put(int i, Vector3<R> x, Vector3<R> v) const {
+    store3<R>(position + 3 * i * stride, stride, x);
+    store3<R>(velocity + 3 * i * stride, stride, v);
+  }
 };
 
 // Rows of the right-hand side and the diagonal that the air on the segments before and after a particle adds.
@@ -267,37 +271,16 @@ struct SubstepResult {
   R strain, iterations;
 };
 
-// One step h from the state in `from` to that in `to` (which may be the same): velocities, positions relative
-// to the moved root, lengths with their velocity correction. `factor` holds kFactorReals values a particle,
-// `to.stride` apart.
-template <class Extra, class R>
-RINGLET_KERNEL SubstepResult<R> advance_strand(const StrandPack<R>& s, const StrandStep<Scalar<R>>& step,
-                                               const RootMotion<R>& root, R h, const StrandArrays<R>& from,
-                                               const StrandArrays<R>& to, Scalar<R>* factor, Mask<R> active) {
-  const StrandParameters<Scalar<R>>& p = step.parameters;
-  const GhostMotion<R> ghosts(root, s.preload, R(1) / h);
-  const int stride = to.stride;
-  factorise<Extra>(s, step, ghosts, h, from, factor, stride);
-  Vector3<R> later[kBand] = {zero3<R>(), zero3<R>(), zero3<R>()};
-  for (int i = s.particles - 1; i >= 0; --i) {
-    Vector3<R> v, x;
-    if (i < p.clamped) {
-      const Vector3<R> rest = s.rest_at(i);
-      v = ghosts.velocity(rest);
-      x = root.ghost_after(rest);  // exact, without the error that sums would gather
-    } else {
-      v = substitute_back(later, factor + kFactorReals * i * stride, stride);
-      x = fma(h, v, from.position_at(i) - root.displacement);
-    }
-    const Mask<R> lives = R(Scalar<R>(i)) < s.count;
-    store3<R>(to.velocity + 3 * i * stride, stride, select(lives, v, zero3<R>()));
-    store3<R>(to.position + 3 * i * stride, stride, select(lives, x, zero3<R>()));
-    later[2] = later[1], later[1] = later[0], later[0] = v;
-  }
+// The lengths of a step h that led to `to`. `scratch` holds kProjectionReals values a particle, `to.stride`
+// apart.
+template <class R>
+RINGLET_KERNEL SubstepResult<R> project_stepped(const StrandPack<R>& s, const StrandParameters<Scalar<R>>& p,
+                                                R h, const StrandArrays<R>& to, Scalar<R>* scratch,
+                                                Mask<R> active) {
   const ProjectedStrand<R> lengths{
       to.position,   to.velocity, R(1) / (h * R(Scalar<R>(1 + p.skipped_substeps))),
       s.rest_length, kLanes,      nullptr,
-      factor,        stride,      s.particles,
+      scratch,       to.stride,   s.particles,
       s.count,       p.clamped};
   const ProjectionResult<R> result =
       project_lengths(lengths, R(p.length_tolerance), p.length_iterations, active);
@@ -325,27 +308,77 @@ RINGLET_KERNEL R write_back(const StrandArrays<R>& from, const StrandArrays<R>& 
   return speed2 + check;
 }
 
-// The substep of one pack of strands: `lane` is its first lane in the batch. `scratch` holds kStepReals
-// values a particle, `stride` apart.
+// How an AMS strand takes a step.
 template <class Extra, class R>
+struct AugmentedMassSpring {
+  using T = Scalar<R>;
+  using Arrays = StrandArrays<R>;
+  const StrandPack<R>& s;
+  const StrandStep<T>& step;
+
+  RINGLET_KERNEL AugmentedMassSpring(const StrandPack<R>& pack, const StrandStep<T>& whole, int batch,
+                                     int lane)
+      : s(pack), step(whole) {
+    if constexpr (Extra::kElongation) remember_elongation(s, step, batch, lane);
+  }
+  RINGLET_KERNEL Arrays state() const { return {s.position, s.velocity, kLanes}; }
+  RINGLET_KERNEL Arrays stepped(T* scratch, int stride) const {
+    T* position = scratch + kFactorReals * s.particles * stride;
+    return {position, position + 3 * s.particles * stride, stride};
+  }
+
+  // One step h from the state in `from` to that in `to` (which may be the same): velocities, positions
+  // relative to the moved root, lengths with their velocity correction. `factor` holds kFactorReals values a
+  // particle, `to.stride` apart.
+  RINGLET_KERNEL SubstepResult<R> advance(const RootMotion<R>& root, R h, const Arrays& from,
+                                          const Arrays& to, T* factor, Mask<R> active) const {
+    const StrandParameters<T>& p = step.parameters;
+    const GhostMotion<R> ghosts(root, s.preload, R(1) / h);
+    const int stride = to.stride;
+    factorise<Extra>(s, step, ghosts, h, from, factor, stride);
+    Vector3<R> later[kBand] = {zero3<R>(), zero3<R>(), zero3<R>()};
+    for (int i = s.particles - 1; i >= 0; --i) {
+      Vector3<R> v, x;
+      if (i < p.clamped) {
+        const Vector3<R> rest = s.rest_at(i);
+        v = ghosts.velocity(rest);
+        x = root.ghost_after(rest);  // exact, without the error that sums would gather
+      } else {
+        v = substitute_back(later, factor + kFactorReals * i * stride, stride);
+        x = fma(h, v, from.position_at(i) - root.displacement);
+      }
+      const Mask<R> lives = R(T(i)) < s.count;
+      to.put(i, select(lives, x, zero3<R>()), select(lives, v, zero3<R>()));
+      later[2] = later[1], later[1] = later[0], later[0] = v;
+    }
+    return project_stepped(s, p, h, to, factor, active);
+  }
+
+  RINGLET_KERNEL R write_back(const Arrays& from, const Arrays& to, Mask<R> done) const {
+    return kernels::write_back(from, to, s.particles, done);
+  }
+};
+
+// The substep of one pack of strands by a model: `lane` is its first lane in the batch. `scratch` holds
+// the model's values a particle, `stride` apart.
+template <class Model, class R>
 RINGLET_KERNEL void step_strands(const StrandStep<Scalar<R>>& step, int batch, int lane, Scalar<R>* scratch,
                                  int stride) {
   using T = Scalar<R>;
+  using Arrays = typename Model::Arrays;
   const StrandPack<R> s(step, batch, lane);
-  const StrandParameters<T>& p = step.parameters;
-  T* position = scratch + kFactorReals * s.particles * stride;
-  const StrandArrays<R> stepped{position, position + 3 * s.particles * stride, stride};
-  const StrandArrays<R> state{s.position, s.velocity, kLanes};
-  R strain = R(0), iterations = R(0), pieces = R(0), speed2 = R(0);
   Mask<R> open = s.count > R(0);
   if (!any(open)) return;  // no strands here
-  if constexpr (Extra::kElongation) remember_elongation(s, step, batch, lane);
+  const StrandParameters<T>& p = step.parameters;
+  const Model model(s, step, batch, lane);
+  const Arrays stepped = model.stepped(scratch, stride), state = model.state();
+  R strain = R(0), iterations = R(0), pieces = R(0), speed2 = R(0);
   for (int parts = 1; parts <= kMostPieces; parts *= 2) {
     R worst = R(0);
     for (int part = 0; part < parts; ++part) {
-      const StrandArrays<R> from = part == 0 ? state : stepped;
-      const SubstepResult<R> result = advance_strand<Extra>(
-          s, step, piece(s.root, part, parts), R(p.step / T(parts)), from, stepped, scratch, open);
+      const Arrays from = part == 0 ? state : stepped;
+      const SubstepResult<R> result =
+          model.advance(piece(s.root, part, parts), R(p.step / T(parts)), from, stepped, scratch, open);
       worst = select(open, result.strain, worst);
       iterations = iterations + select(open, result.iterations, R(0));
     }
@@ -354,7 +387,7 @@ RINGLET_KERNEL void step_strands(const StrandStep<Scalar<R>>& step, int batch, i
     const bool last = p.length_iterations == 0 || 2 * parts > kMostPieces || !any(late);
     // Lanes that are done, or all of them at the last try, take their result; the others start again.
     const Mask<R> done = last ? open : open & !late;
-    speed2 = select(done, write_back(stepped, state, s.particles, done), speed2);
+    speed2 = select(done, model.write_back(stepped, state, done), speed2);
     if (last) break;
     open = late;
   }
@@ -364,20 +397,6 @@ RINGLET_KERNEL void step_strands(const StrandStep<Scalar<R>>& step, int batch, i
   store(s.figures + kSpeed * kLanes, sqrt(speed2));
   const Mask<R> healthy = (strain <= R(p.strain_limit)) & (speed2 <= R(p.speed_limit * p.speed_limit));
   store(s.figures + kDiverged * kLanes, select(healthy, R(0), R(1)));
-}
-
-// Calls `call` with the Extras that a step asks for.
-template <class T, class Call>
-void with_extras(const StrandStep<T>& step, const Call& call) {
-  const bool air = step.air.velocity != nullptr, elongation = step.elongation.memory != nullptr;
-  if (air && elongation)
-    call(Extras<true, true>{});
-  else if (air)
-    call(Extras<true, false>{});
-  else if (elongation)
-    call(Extras<false, true>{});
-  else
-    call(Extras<false, false>{});
 }
 
 }  // namespace RINGLET_ISA

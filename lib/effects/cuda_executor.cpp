@@ -41,13 +41,19 @@ class CudaExecutor : public Executor<float> {
   }
 
   void submit(const state::StrandState<float>& state) override {
-    on_device([&] { strands_->upload_state({state.position, state.velocity, state.elongation}); });
+    on_device([&] {
+      strands_->upload_state({state.position, state.velocity, state.elongation, state.companion_position,
+                              state.companion_velocity});
+    });
   }
   void submit_roots(const state::StrandState<float>& state) override {
     on_device([&] { strands_->upload_roots(state.root_motion, state.root_points); });
   }
   void fetch(state::StrandState<float>& state) override {
-    on_device([&] { strands_->download_state({state.position, state.velocity, state.elongation}); });
+    on_device([&] {
+      strands_->download_state({state.position, state.velocity, state.elongation, state.companion_position,
+                                state.companion_velocity});
+    });
   }
 
   void strand_step(const kernels::StrandStep<float>& step) override {

@@ -29,7 +29,7 @@ Vec3 Roots::centre() const {
 
 bool Roots::still() const {
   for (const Group& group : groups_) {
-    if (group.attachment ? head_->motion() != Motion::kStill : !group.animation.keys.empty()) return false;
+    if (group.attachment ? head_->motion() != Motion::kStill : group.animation.keyed()) return false;
   }
   return true;
 }
@@ -42,10 +42,7 @@ void move_rigidly(const Pose& whole, std::span<const Vec3> rest, std::span<Pose>
 }
 
 Pose keyed_pose(const scene::Animation& animation, const scene::Frames& frames, double time) {
-  const auto at = [&](double seconds) {
-    return solids::sample_keys(animation.keys, animation.interpolation, frames.first + seconds * frames.fps);
-  };
-  solids::Similarity now = at(std::max(time, 0.0));
+  solids::Similarity now = solids::sample_animation(animation, frames, std::max(time, 0.0));
   if (time < 0) {  // preroll: from the rest pose to the first one
     const double preroll = frames.preroll / frames.fps;
     now = solids::interpolate(solids::Similarity{}, now, solids::ease(1.0 + time / preroll));
@@ -58,8 +55,8 @@ Pose keyed_pose(const scene::Animation& animation, const scene::Frames& frames, 
 void Roots::pose_group(const Group& group, double time, std::span<const Vec3> head_vertices,
                        std::span<Pose> out) const {
   if (!group.attachment) {
-    const bool moves = !group.animation.keys.empty();
-    move_rigidly(moves ? keyed_pose(group.animation, frames_, time) : Pose{}, group.rest, out);
+    move_rigidly(group.animation.keyed() ? keyed_pose(group.animation, frames_, time) : Pose{}, group.rest,
+                 out);
   } else if (head_->motion() == Motion::kDeforming) {
     group.attachment->pose(head_vertices, out);
   } else {

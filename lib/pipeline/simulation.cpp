@@ -35,6 +35,7 @@ state::StrandInput strand_input(const scene::Scene& scene, const World& world) {
   input.rest = world.strands.points;
   input.stiffness = world.stiffness;
   input.elongation = scene.effects.non_hookean.has_value();
+  input.companions = scene.model.type == scene::ModelType::kMassSpring;
   if (scene.model.preload && scene.effects.gravity) {
     std::vector<Pose> poses(world.strands.size());
     world.roots->pose(first_time(scene.frames), poses);
@@ -98,7 +99,7 @@ class TypedSimulation : public Simulation {
       : scene_(scene),
         world_(build_world(scene_)),
         model_(strand_input<T>(scene_, world_)),
-        state_(model_.layout),
+        state_(model_),
         executor_(make_executor(model_, options)),
         before_(world_.strands.size()),
         now_(world_.strands.size()) {
@@ -317,8 +318,12 @@ state::Snapshot TypedSimulation<T>::snapshot(int frame) const {
   snapshot.frame = frame;
   snapshot.arrays["position"] = bytes_of(state_.position.data(), state_.position.size() * sizeof(T));
   snapshot.arrays["velocity"] = bytes_of(state_.velocity.data(), state_.velocity.size() * sizeof(T));
-  if (!state_.elongation.empty())
-    snapshot.arrays["elongation"] = bytes_of(state_.elongation.data(), state_.elongation.size() * sizeof(T));
+  const auto save_if_there = [&](const char* name, const state::AlignedVector<T>& array) {
+    if (!array.empty()) snapshot.arrays[name] = bytes_of(array.data(), array.size() * sizeof(T));
+  };
+  save_if_there("elongation", state_.elongation);
+  save_if_there("companion_position", state_.companion_position);
+  save_if_there("companion_velocity", state_.companion_velocity);
   return snapshot;
 }
 
@@ -338,7 +343,12 @@ bool TypedSimulation<T>::run(const FrameRange& range, state::FrameSink& sink, co
     frame = control.resume->frame;
     restore(*control.resume, "position", state_.position);
     restore(*control.resume, "velocity", state_.velocity);
-    if (!state_.elongation.empty()) restore(*control.resume, "elongation", state_.elongation);
+    const auto restore_if_there = [&](const char* name, state::AlignedVector<T>& array) {
+      if (!array.empty()) restore(*control.resume, name, array);
+    };
+    restore_if_there("elongation", state_.elongation);
+    restore_if_there("companion_position", state_.companion_position);
+    restore_if_there("companion_velocity", state_.companion_velocity);
     world_.roots->pose(time_of(frame, 0), now_);
     for (std::size_t s = 0; s < now_.size(); ++s) set_root_motion(state_, model_.layout, s, now_[s], now_[s]);
     executor_->submit(state_);

@@ -76,17 +76,31 @@ class Builder {
     return units;
   }
 
-  // Of a mesh, or of a groom, whose animation has no clip.
-  static Animation animation(const Json& block) {
-    Animation animation;
-    for (const Json& key : block["keys"]) {
+  static std::vector<Key> keys(const Json& list) {
+    std::vector<Key> keys;
+    for (const Json& key : list) {
       const Json& q = key["rotate"];
       const Quat rotate =
           Quat(q[3].get<double>(), q[0].get<double>(), q[1].get<double>(), q[2].get<double>()).normalized();
-      animation.keys.push_back({key["frame"], vec3(key["translate"]), rotate, key["scale"]});
+      keys.push_back({key["frame"], vec3(key["translate"]), rotate, key.value("scale", 1.0)});
     }
-    animation.interpolation = word<Interpolation>(
-        block["interpolation"], {{"smooth", Interpolation::kSmooth}, {"linear", Interpolation::kLinear}});
+    return keys;
+  }
+
+  static Interpolation interpolation(const Json& block) {
+    return word<Interpolation>(block["interpolation"],
+                               {{"smooth", Interpolation::kSmooth}, {"linear", Interpolation::kLinear}});
+  }
+
+  // Of a mesh, or of a groom, whose animation has no clip.
+  Animation animation(const Json& block) const {
+    const Json& motion = document_["motion"];
+    Animation animation;
+    animation.keys = keys(block["keys"]);
+    animation.interpolation = interpolation(block);
+    animation.carrier = keys(motion["keys"]);
+    animation.carrier_interpolation = interpolation(motion);
+    animation.speed = motion["speed"];
     animation.clip = optional<std::string>(block, "clip");
     animation.loop = block.contains("loop") && block["loop"].get<bool>();
     return animation;
@@ -160,7 +174,8 @@ class Builder {
     const Json& block = document_["model"];
     const Json& stiffness = block["stiffness"];
     Model model;
-    model.type = word<ModelType>(block["type"], {{"ams", ModelType::kAms}});
+    model.type =
+        word<ModelType>(block["type"], {{"ams", ModelType::kAms}, {"mass_spring", ModelType::kMassSpring}});
     model.scheme =
         word<Scheme>(block["scheme"], {{"projected", Scheme::kProjected}, {"paper", Scheme::kPaper}});
     model.stiffness = {stiffness["edge"], stiffness["bend"], stiffness["twist"], stiffness["integrity"],

@@ -56,6 +56,7 @@ class Checks {
 
   std::vector<Problem> run() {
     frames();
+    keys("/motion", document_["motion"]);
     if (has_head()) keys("/head/animation", document_["head"]["animation"]);
     for (const auto& [pointer, groom] : grooms_of(document_)) check_groom(pointer, *groom);
     non_hookean();
@@ -149,6 +150,9 @@ class Checks {
 
   void non_hookean() {
     if (!document_["effects"].contains("non_hookean")) return;
+    if (document_["model"]["type"] != "ams")
+      add("/effects/non_hookean", "softening with model " + brief(document_["model"]["type"]),
+          "model \"ams\"", "only its integrity coupling softens");
     const Json& curve = document_["effects"]["non_hookean"]["curve"];
     const auto at = [](std::size_t i, int axis) {
       return fmt::format("/effects/non_hookean/curve/{}/{}", i, axis);

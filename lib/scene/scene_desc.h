@@ -51,6 +51,13 @@ struct Animation {
   Interpolation interpolation;
   std::optional<std::string> clip;  // a clip of the file; "" is its first
   bool loop;                        // the clip repeats; otherwise it holds at its end
+  // The scene's own `motion`, the same for all: it carries what the above has moved, and clip, keys and
+  // sequence all run `speed` times as fast from frame `first` on.
+  std::vector<Key> carrier = {};
+  Interpolation carrier_interpolation = Interpolation::kSmooth;
+  double speed = 1;
+
+  bool keyed() const { return !keys.empty() || !carrier.empty(); }
 };
 
 // A mesh file. `#` characters in the file name stand for the digits of a numbered sequence (one file a
@@ -126,7 +133,7 @@ struct Groom {
 // ---- Model
 // -------------------------------------------------------------------------------------------------------
 
-enum class ModelType { kAms };
+enum class ModelType { kAms, kMassSpring };
 enum class Scheme { kProjected, kPaper };  // physics.md section 1
 enum class AngularTangent { kConsistent, kPaper };
 enum class IntegrityTangent { kExact, kPaper };

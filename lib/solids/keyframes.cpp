@@ -54,4 +54,12 @@ Similarity sample_keys(std::span<const scene::Key> keys, scene::Interpolation in
   return result;
 }
 
+Similarity sample_animation(const scene::Animation& animation, const scene::Frames& frames, double time) {
+  const double frame = frames.first + time * animation.speed * frames.fps;
+  const Similarity own = sample_keys(animation.keys, animation.interpolation, frame);
+  if (animation.carrier.empty()) return own;
+  const Similarity carrier = sample_keys(animation.carrier, animation.carrier_interpolation, frame);
+  return {carrier.rotate * own.translate + carrier.translate, carrier.rotate * own.rotate, own.scale};
+}
+
 }  // namespace ringlet::solids

@@ -19,6 +19,9 @@ struct Similarity {
 // slerps the shorter way. No keys: the identity.
 Similarity sample_keys(std::span<const scene::Key> keys, scene::Interpolation interpolation, double frame);
 
+// Where an animation's keys put an asset at `time` [s] after frame `first`: its own, then the scene's motion.
+Similarity sample_animation(const scene::Animation& animation, const scene::Frames& frames, double time);
+
 // Between two similarities: straight lines and slerp.
 Similarity interpolate(const Similarity& a, const Similarity& b, double weight_of_b);
 

@@ -98,19 +98,19 @@ struct AnimatedMesh::Impl {
 
   // The clip's time: held at its end, or wrapped.
   double clip_time(double time) const {
+    time *= animation.speed;
     if (!animation.loop || rig.clip_length == 0) return std::min(time, rig.clip_length);
     return std::fmod(time, rig.clip_length);
   }
 
   void sample(double time, double presence, std::span<Vec3> out) const {
     const double after_start = std::max(time, 0.0);
-    const Similarity keys =
-        sample_keys(animation.keys, animation.interpolation, frames.first + after_start * frames.fps);
+    const Similarity keys = sample_animation(animation, frames, after_start);
     const Affine placement = transform(interpolate({}, keys, presence)) * units;
     if (sequence.frames.empty()) {
       sample_rig(rig, {clip_time(after_start), rig.has_clip ? presence : 0}, placement, out);
     } else {
-      sample_sequence(sequence, after_start * frames.fps, animation.loop, placement, out);
+      sample_sequence(sequence, after_start * animation.speed * frames.fps, animation.loop, placement, out);
     }
   }
 
@@ -120,8 +120,9 @@ struct AnimatedMesh::Impl {
     double end = rig.has_clip ? rig.clip_length : 0;
     if (!sequence.frames.empty())
       end = std::max(end, seconds(static_cast<double>(sequence.frames.size()) - 1));
-    for (const scene::Key& key : animation.keys) end = std::max(end, seconds(key.frame - frames.first));
-    return end;
+    for (const auto* keys : {&animation.keys, &animation.carrier})
+      for (const scene::Key& key : *keys) end = std::max(end, seconds(key.frame - frames.first));
+    return end / animation.speed;
   }
 
   // Every instant at which the motion may change its course, and the middles between.
@@ -130,12 +131,15 @@ struct AnimatedMesh::Impl {
     std::set<double> times;
     for (int frame = -frames.preroll; frame <= frames.last - frames.first; ++frame)
       times.insert(seconds(frame));
-    for (const scene::Key& key : animation.keys) times.insert(seconds(key.frame - frames.first));
+    for (const auto* keys : {&animation.keys, &animation.carrier})
+      for (const scene::Key& key : *keys) times.insert(seconds(key.frame - frames.first) / animation.speed);
     if (rig.has_clip) {
-      const double period =
-          animation.loop && rig.clip_length > 0 ? rig.clip_length : end + rig.clip_length + 1;
+      const double period = animation.loop && rig.clip_length > 0
+                                ? rig.clip_length
+                                : animation.speed * end + rig.clip_length + 1;
       for (const double key : rig.key_times())
-        for (double time = key; time <= end; time += period) times.insert(time);
+        for (double time = key; time <= animation.speed * end; time += period)
+          times.insert(time / animation.speed);
     }
     std::vector<double> result;
     for (const double time : times) {
@@ -147,7 +151,7 @@ struct AnimatedMesh::Impl {
   }
 
   Motion classify() const {
-    if (animation.keys.empty() && !rig.has_clip && sequence.frames.size() < 2) return Motion::kStill;
+    if (!animation.keyed() && !rig.has_clip && sequence.frames.size() < 2) return Motion::kStill;
     const double tolerance = kStillness * extent(rest);
     std::vector<Vec3> now(rest.size()), rigid(rest.size());
     Motion motion = Motion::kStill;

@@ -31,6 +31,7 @@ StrandModel<T>::StrandModel(const StrandInput& input)
       rest_length(layout.rows() * 3 * kLanes, T(0)),
       stiffness(input.stiffness.empty() ? 0 : layout.rows() * kCouplings * kLanes, T(0)),
       preload(layout.batches() * 3 * kLanes, T(0)),
+      rest_companion(input.companions ? rest.size() : 0, T(0)),
       per_length(input.elongation ? layout.batches() * kLanes : 0, T(0)) {
   std::size_t first = 0;
   for (std::size_t strand = 0; strand < input.counts.size(); ++strand) {
@@ -48,6 +49,12 @@ StrandModel<T>::StrandModel(const StrandInput& input)
       for (int a = 0; a < 3 && i + 1 + a < n; ++a)
         rest_length[layout.at(strand, i, 3, a)] =
             kernels::length(get(rest, layout, strand, i + 1 + a) - get(rest, layout, strand, i));
+    if (input.companions) {
+      const std::vector<Vec3> companions = rest_companions(std::span(input.rest).subspan(first, n));
+      for (int i = 0; i + 1 < n; ++i)
+        for (int c = 0; c < 3; ++c)
+          rest_companion[layout.at(strand, i, 3, c)] = static_cast<T>(companions[i][c]);
+    }
     if (input.elongation) {
       double length = 0;
       for (int i = 0; i + 1 < n; ++i) length += (input.rest[first + i + 1] - input.rest[first + i]).norm();
@@ -64,27 +71,38 @@ StrandModel<T>::StrandModel(const StrandInput& input)
 template <class T>
 kernels::StrandBatches<T> StrandModel<T>::view() const {
   const auto or_null = [](const AlignedVector<T>& array) { return array.empty() ? nullptr : array.data(); };
-  return {layout.batches(),   layout.row().data(), count.data(),   rest.data(),
-          rest_length.data(), or_null(stiffness),  preload.data(), or_null(per_length)};
+  return {layout.batches(), layout.row().data(),     count.data(),
+          rest.data(),      rest_length.data(),      or_null(stiffness),
+          preload.data(),   or_null(rest_companion), or_null(per_length)};
 }
 
 template <class T>
 std::size_t StrandModel<T>::bytes() const {
   return (count.size() + rest.size() + rest_length.size() + stiffness.size() + preload.size() +
-          per_length.size()) *
+          rest_companion.size() + per_length.size()) *
          sizeof(T);
 }
 
 template <class T>
-StrandState<T>::StrandState(const StrandLayout& layout)
-    : position(layout.rows() * 3 * kLanes, T(0)),
-      velocity(layout.rows() * 3 * kLanes, T(0)),
-      root_motion(static_cast<std::size_t>(layout.batches()) * kRootValues * kLanes, T(0)),
-      root_points(static_cast<std::size_t>(layout.batches()) * 3 * kLanes, 0.0) {}
+StrandState<T>::StrandState(const StrandModel<T>& model)
+    : position(model.rest.size(), T(0)),
+      velocity(model.rest.size(), T(0)),
+      root_motion(model.count.size() * kRootValues, T(0)),
+      root_points(model.count.size() * 3, 0.0),
+      companion_position(model.rest_companion.size(), T(0)),
+      companion_velocity(model.rest_companion.size(), T(0)) {}
+
+template <class T>
+kernels::StrandState<T> StrandState<T>::view() {
+  if (companion_position.empty()) return {position.data(), velocity.data()};
+  return {position.data(), velocity.data(), companion_position.data(), companion_velocity.data()};
+}
 
 template <class T>
 std::size_t StrandState<T>::bytes() const {
-  return (position.size() + velocity.size() + root_motion.size() + elongation.size()) * sizeof(T) +
+  return (position.size() + velocity.size() + root_motion.size() + elongation.size() +
+          companion_position.size() + companion_velocity.size()) *
+             sizeof(T) +
          root_points.size() * sizeof(double);
 }
 
@@ -104,23 +122,53 @@ void set_root_motion(StrandState<T>& state, const StrandLayout& layout, std::siz
   }
 }
 
+std::vector<Vec3> rest_companions(std::span<const Vec3> rest) {
+  std::vector<Vec3> companions;
+  Vec3 tangent = Vec3::Zero(), side = Vec3::UnitX();
+  for (std::size_t i = 0; i + 1 < rest.size(); ++i) {
+    const Vec3 segment = rest[i + 1] - rest[i];
+    const double length = segment.norm();
+    if (length > 0) {  // the side is carried along the hair without turning about it
+      const Vec3 next = segment / length;
+      side = tangent.isZero() ? next.unitOrthogonal() : Vec3(Quat::FromTwoVectors(tangent, next) * side);
+      tangent = next;
+    }
+    const Vec3 across = tangent.cross(side);
+    const Vec3 offset[4] = {side, across, -side, -across};
+    companions.push_back(rest[i] - rest[0] + 0.5 * segment + 0.5 * length * offset[i % 4]);
+  }
+  return companions;
+}
+
+namespace {
+
+// `rest` [rows][3] carried by the roots' rotations.
 template <class T>
-void pose_at_rest(StrandState<T>& state, const StrandModel<T>& model, std::span<const Pose> roots) {
-  const StrandLayout& layout = model.layout;
+void turn_by_roots(const StrandLayout& layout, const AlignedVector<T>& rest, std::span<const Pose> roots,
+                   AlignedVector<T>& position) {
   for (std::size_t strand = 0; strand < layout.strands(); ++strand) {
     kernels::Matrix3<T> rotation;
     for (int k = 0; k < 9; ++k) rotation.m[k] = static_cast<T>(roots[strand].rotation(k / 3, k % 3));
     for (int i = 0; i < layout.count(strand); ++i) {
-      const V<T> x = rotation * get(model.rest, layout, strand, i);
+      const V<T> x = rotation * get(rest, layout, strand, i);
       const T components[3] = {x.x, x.y, x.z};
-      for (int c = 0; c < 3; ++c) {
-        state.position[layout.at(strand, i, 3, c)] = components[c];
-        state.velocity[layout.at(strand, i, 3, c)] = T(0);
-      }
+      for (int c = 0; c < 3; ++c) position[layout.at(strand, i, 3, c)] = components[c];
     }
-    for (int c = 0; c < 3; ++c) state.root_points[layout.at_strand(strand, 3, c)] = roots[strand].position[c];
   }
-  std::fill(state.elongation.begin(), state.elongation.end(), T(0));
+}
+
+}  // namespace
+
+template <class T>
+void pose_at_rest(StrandState<T>& state, const StrandModel<T>& model, std::span<const Pose> roots) {
+  turn_by_roots(model.layout, model.rest, roots, state.position);
+  if (!model.rest_companion.empty())
+    turn_by_roots(model.layout, model.rest_companion, roots, state.companion_position);
+  for (AlignedVector<T>* array : {&state.velocity, &state.companion_velocity, &state.elongation})
+    std::fill(array->begin(), array->end(), T(0));
+  for (std::size_t strand = 0; strand < model.layout.strands(); ++strand)
+    for (int c = 0; c < 3; ++c)
+      state.root_points[model.layout.at_strand(strand, 3, c)] = roots[strand].position[c];
 }
 
 template struct StrandModel<float>;

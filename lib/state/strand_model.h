@@ -3,6 +3,7 @@
 #include <tbb/cache_aligned_allocator.h>
 
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "core/geometry.h"
@@ -20,6 +21,7 @@ struct StrandInput {
   std::vector<float> stiffness;      // [particles * kCouplings] [1/s^2], empty: uniform
   std::vector<Mat3> first_rotation;  // [strands] root rotation at the first frame; for the preload
   std::optional<Vec3> preload;       // gravity to preload against [m/s^2]; empty: no preload
+  bool companions = false;           // the mass-spring model's
   bool elongation = false;           // the strands' lengths are asked for (kernels::Elongation)
 };
 
@@ -27,7 +29,7 @@ template <class T>
 struct StrandModel {
   StrandLayout layout;
   AlignedVector<T> count, rest, rest_length, stiffness, preload;
-  AlignedVector<T> per_length;  // [batches] or empty
+  AlignedVector<T> rest_companion, per_length;  // [rows][3], [batches]; or empty
 
   explicit StrandModel(const StrandInput& input);
   kernels::StrandBatches<T> view() const;
@@ -40,11 +42,12 @@ struct StrandState {
   AlignedVector<T> root_motion;         // [batches][kRootValues]
   AlignedVector<double> root_points;    // [batches][3] at the substep's end [m]
   // Empty, unless an effect that has them is there; it makes them.
-  AlignedVector<T> elongation;  // [rows] kernels::Elongation::memory
-  AlignedVector<T> air;         // [rows][3] kernels::Air::velocity [m/s]
+  AlignedVector<T> elongation;                              // [rows] kernels::Elongation::memory
+  AlignedVector<T> air;                                     // [rows][3] kernels::Air::velocity [m/s]
+  AlignedVector<T> companion_position, companion_velocity;  // [rows][3] kernels::StrandState
 
-  explicit StrandState(const StrandLayout& layout);
-  kernels::StrandState<T> view() { return {position.data(), velocity.data()}; }
+  explicit StrandState(const StrandModel<T>& model);
+  kernels::StrandState<T> view();
   std::size_t bytes() const;
 };
 
@@ -52,6 +55,10 @@ struct StrandState {
 template <class T>
 void set_root_motion(StrandState<T>& state, const StrandLayout& layout, std::size_t strand,
                      const Pose& before, const Pose& after);
+
+// The companions of a strand's segments at rest (kernels/strand/mass_spring_step.h), relative to its root:
+// half a segment's length off its middle, a quarter of a turn about the hair from segment to segment. [m]
+std::vector<Vec3> rest_companions(std::span<const Vec3> rest);
 
 // The rest shape carried to these root poses, at rest: positions relative to the root, no velocity.
 template <class T>

@@ -46,7 +46,7 @@ constexpr Case kSchemaCases[] = {
     {R"({"effects": {"solids": {}}})", "scene#/effects/solids: found {}, expected a list, each an object"},
     // enum
     {R"({"units": {"up": "w"}})", R"(scene#/units/up: found "w", expected "x", "y" or "z")"},
-    {R"({"model": {"type": "mass_spring"}})", R"(scene#/model/type: found "mass_spring", expected "ams")"},
+    {R"({"model": {"type": "rods"}})", R"(scene#/model/type: found "rods", expected "ams" or "mass_spring")"},
     // minimum, maximum, exclusiveMinimum
     {R"({"model": {"substeps": 0}})", "scene#/model/substeps: found 0, expected an integer from 1 to 1000"},
     {R"({"model": {"substeps": 1001}})",
@@ -122,6 +122,9 @@ constexpr Case kMeaningCases[] = {
      "scene#/head/animation/keys/1/frame: found 3.0, expected a frame after the previous key's 3.0"},
     {R"({"groom": {"animation": {"keys": [{"frame": 3, "rotate": [0, 0, 0, 0]}]}}})",
      "scene#/groom/animation/keys/0/rotate: found [0.0,0.0,0.0,0.0], expected a quaternion that is not zero"},
+    {R"({"motion": {"keys": [{"frame": 3}, {"frame": 2, "rotate": [0, 0, 0, 0]}]}})",
+     "scene#/motion/keys/1/frame: found 2.0, expected a frame after the previous key's 3.0\n"
+     "scene#/motion/keys/1/rotate: found [0.0,0.0,0.0,0.0], expected a quaternion that is not zero"},
     // grooms
     {R"({"groom": {"file": null}})", "scene#/groom: found neither file nor grow, expected one of them"},
     {R"({"head": {"mesh": "head.obj"}, "groom": {"grow": {"strands": 9}}})",
@@ -156,6 +159,8 @@ constexpr Case kMeaningCases[] = {
     {R"({"groom": [{"file": "a.hair", "attach": "fixed"}, {"file": "b.hair", "name": "a", "attach": "fixed"}]})",
      R"(scene#/groom/1/name: found "a", expected a name other than that of /groom/0)"},
     // non-Hookean integrity
+    {R"({"model": {"type": "mass_spring"}, "effects": {"non_hookean": {}}})",
+     R"(scene#/effects/non_hookean: found softening with model "mass_spring", expected model "ams" (only its integrity coupling softens))"},
     {R"({"effects": {"non_hookean": {"curve": [[0.5, 0.4]]}}})",
      "scene#/effects/non_hookean/curve/0/1: found 0.4, expected the first point on Hooke's line, 0.5"},
     {R"({"effects": {"non_hookean": {"curve": [[0.5, 0.5], [0.5, 0.6], [0.7, 0.55]]}}})",

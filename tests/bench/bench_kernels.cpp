@@ -53,7 +53,7 @@ enum class Motion { kStill, kShaken };
 template <class T>
 struct Bench {
   state::StrandModel<T> model{wig().input};
-  state::StrandState<T> state{model.layout};
+  state::StrandState<T> state{model};
   state::AlignedVector<T> figures, scratch;
   kernels::StrandParameters<T> parameters{};
   std::vector<Pose> pose = wig().roots;

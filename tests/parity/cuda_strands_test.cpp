@@ -51,13 +51,13 @@ struct DeviceGroom {
         velocity(host.state.velocity.size()),
         strand_figures(host.strand_figures.size()),
         contact_figures(host.contact_figures.size()) {
-    strands->upload_state({host.state.position, host.state.velocity, host.state.elongation});
+    strands->upload_state({host.state.position, host.state.velocity});
   }
   void move_roots(const HostGroom& host) {
     strands->upload_roots(host.state.root_motion, host.state.root_points);
   }
   void fetch() {
-    strands->download_state({position, velocity, {}});
+    strands->download_state({position, velocity});
     strands->download_figures(strand_figures, contact_figures);
   }
 };
@@ -225,7 +225,7 @@ TEST_F(Cuda, WrongSizesAreRefused) {
   const HostGroom host(helices(3));
   DeviceGroom device(host);
   const std::vector<float> few(5);
-  EXPECT_THROW(device.strands->upload_state({few, host.state.velocity, {}}), CudaError);
+  EXPECT_THROW(device.strands->upload_state({few, host.state.velocity}), CudaError);
   EXPECT_THROW(device.strands->upload_skin(std::vector<std::int32_t>(5)), CudaError);
 }
 

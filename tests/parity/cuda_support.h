@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "kernels/solid/response.h"
-#include "kernels/strand/strand_step.h"
+#include "kernels/strand/strand_models.h"
 #include "state/strand_model.h"
 
 namespace ringlet::cuda_testing {
@@ -78,12 +78,12 @@ struct HostGroom {
 
   explicit HostGroom(const state::StrandInput& input)
       : model(input),
-        state(model.layout),
+        state(model),
         strand_figures(lanes() * kFigures),
         contact_figures(lanes() * kContactFigures),
         skin(lanes(), kernels::kNoSkin),
         scratch_(static_cast<std::size_t>(model.layout.longest()) *
-                 std::max(kernels::kStepReals, kernels::kContactReals)) {
+                 std::max(kernels::kMassSpringReals, kernels::kContactReals)) {
     pose_at_rest(state, model, roots(0));
   }
 
@@ -113,7 +113,10 @@ struct HostGroom {
   }
   void step(const kernels::StrandParameters<float>& parameters) {
     for_each_lane([&, step = strand_step(parameters)](int batch, int lane) {
-      kernels::step_strands<kernels::Extras<false, false>, float>(step, batch, lane, scratch_.data(), 1);
+      kernels::with_strand_model(step, [&](auto model) {
+        using Model = typename decltype(model)::template For<float>;
+        kernels::step_strands<Model, float>(step, batch, lane, scratch_.data(), 1);
+      });
     });
   }
 

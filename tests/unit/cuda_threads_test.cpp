@@ -42,15 +42,16 @@ TEST(CudaThreads, ScratchIsDisjointAndFitsAndCoalesces) {
   for (const auto& groom : kGrooms) {
     const int batches = static_cast<int>(groom.size());
     const std::vector<std::int32_t> row = rows_of(groom), begin = scratch_particles(row.data(), batches);
-    std::vector<float> values(static_cast<std::size_t>(begin.back()) * kScratchReals * kWarp);
-    const WarpScratch scratch{begin.data(), values.data()};
+    constexpr int kReals = 7;
+    std::vector<float> values(static_cast<std::size_t>(begin.back()) * kReals * kWarp);
+    const WarpScratch scratch{begin.data(), values.data(), kReals};
     std::vector<char> taken(values.size());
     for (int thread = 0; thread < batches * kLanes; ++thread) {
       const int particles = groom[strand_of_thread(thread).batch];
       const std::int64_t first = scratch.of(thread) - values.data();
       EXPECT_EQ(first % kWarp, thread % kWarp);  // a warp's threads touch 32 neighbouring words
-      EXPECT_EQ(first / kWarp % kScratchReals, 0);
-      for (int k = 0; k < particles * kScratchReals; ++k) {
+      EXPECT_EQ(first / kWarp % kReals, 0);
+      for (int k = 0; k < particles * kReals; ++k) {
         const std::size_t at = static_cast<std::size_t>(first + std::int64_t{k} * kWarp);
         ASSERT_LT(at, taken.size());
         ASSERT_FALSE(taken[at]) << "thread " << thread << " shares scratch";
@@ -62,7 +63,7 @@ TEST(CudaThreads, ScratchIsDisjointAndFitsAndCoalesces) {
 
 TEST(CudaThreads, ScratchOffsetsPassFourBillion) {
   constexpr int kParticles = 20'000'000;
-  EXPECT_EQ(scratch_offset(kParticles, 33), std::int64_t{kParticles} * kScratchReals * 32 + 1);
+  EXPECT_EQ(scratch_offset(kParticles, 33, 39), std::int64_t{kParticles} * 39 * 32 + 1);
 }
 
 // All threads of a launch one after the other, each with the scratch it has on the device.
@@ -70,24 +71,37 @@ template <class Thread>
 void run_threads(HostGroom& groom, const Thread& make) {
   const auto& layout = groom.model.layout;
   const auto begin = scratch_particles(layout.row().data(), layout.batches());
-  std::vector<float> values(static_cast<std::size_t>(begin.back()) * kScratchReals * kWarp);
-  const auto function = make(WarpScratch{begin.data(), values.data()});
+  const int reals = scratch_reals_of(groom.model.view());
+  std::vector<float> values(static_cast<std::size_t>(begin.back()) * reals * kWarp);
+  const auto function = make(WarpScratch{begin.data(), values.data(), reals});
   for (int thread = 0; thread < layout.batches() * kLanes; ++thread) function(thread);
 }
 
-TEST(CudaThreads, StepAsTheLanesDo) {
+void expect_steps_of_the_lanes(const state::StrandInput& input) {
   const StrandParameters<float> parameters = default_parameters();
-  HostGroom lanes(mixed_strands(70, 1)), threads(mixed_strands(70, 1));
+  HostGroom lanes(input), threads(input);
   for (int k = 0; k < 10; ++k) {
     lanes.move_roots(parameters.step), threads.move_roots(parameters.step);
     lanes.step(parameters);
-    run_threads(threads, [&](WarpScratch scratch) {
-      return StrandStepThread<Extras<false, false>>{threads.strand_step(parameters), scratch};
+    const auto step = threads.strand_step(parameters);
+    with_strand_model(step, [&](auto model) {
+      run_threads(threads, [&](WarpScratch scratch) {
+        return StrandStepThread<decltype(model)>{step, scratch};
+      });
     });
   }
   EXPECT_EQ(lanes.state.position, threads.state.position);
   EXPECT_EQ(lanes.state.velocity, threads.state.velocity);
+  EXPECT_EQ(lanes.state.companion_position, threads.state.companion_position);
   EXPECT_EQ(lanes.strand_figures, threads.strand_figures);
+}
+
+TEST(CudaThreads, StepAsTheLanesDo) { expect_steps_of_the_lanes(mixed_strands(70, 1)); }
+
+TEST(CudaThreads, StepMassSpringStrandsAsTheLanesDo) {
+  state::StrandInput input = mixed_strands(70, 1);
+  input.companions = true;
+  expect_steps_of_the_lanes(input);
 }
 
 TEST(CudaThreads, BlowAndShelterAsTheKernelsOfTheProcessorDo) {

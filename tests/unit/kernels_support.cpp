@@ -1,6 +1,6 @@
 #include "kernels_support.h"
 
-#include "kernels/strand/strand_step.h"
+#include "kernels/strand/strand_models.h"
 
 namespace ringlet::kernels_testing {
 
@@ -10,8 +10,9 @@ const kernels::KernelTable<T>& scalar_kernels() {
       [](const kernels::StrandStep<T>& step, int begin, int end, T* scratch) {
         for (int batch = begin; batch < end; ++batch)
           for (int lane = 0; lane < kernels::kLanes; ++lane)
-            kernels::with_extras(step, [&](auto extra) {
-              kernels::step_strands<decltype(extra), T>(step, batch, lane, scratch, 1);
+            kernels::with_strand_model(step, [&](auto model) {
+              using Model = typename decltype(model)::template For<T>;
+              kernels::step_strands<Model, T>(step, batch, lane, scratch, 1);
             });
       },
       [](const kernels::ContactStep<T>& step, int begin, int end, T* scratch) {

@@ -103,6 +103,20 @@ TEST_F(SceneLoad, ReadsMotion) {
   EXPECT_FALSE(still.head->animation.clip);
 }
 
+TEST_F(SceneLoad, ReadsTheScenesMotionIntoEveryAnimation) {
+  const Scene s = load_json(full());
+  for (const Animation& a : {s.head->animation, s.grooms[1].animation, s.effects.solids[1].mesh->animation}) {
+    EXPECT_EQ(a.speed, 3);
+    EXPECT_EQ(a.carrier_interpolation, Interpolation::kLinear);
+    ASSERT_EQ(a.carrier.size(), 2u);
+    EXPECT_EQ(a.carrier[1].frame, 5);
+    EXPECT_EQ(a.carrier[1].translate, Vec3(0.02, 0, 0));
+    EXPECT_EQ(a.carrier[1].rotate.coeffs(), Quat(0, 0, 1, 0).coeffs());
+  }
+  EXPECT_TRUE(load_json(minimal(), {"/motion/keys=[{\"frame\": 1}]"}).grooms[0].animation.keyed());
+  EXPECT_FALSE(load_json(minimal()).grooms[0].animation.keyed());
+}
+
 TEST_F(SceneLoad, ReadsGrooms) {
   const Scene s = load_json(full());
   ASSERT_EQ(s.grooms.size(), 3u);
@@ -153,6 +167,10 @@ TEST_F(SceneLoad, ReadsTheNonHookeanCurve) {
   const NonHookean n = load_json(full()).effects.non_hookean.value();
   EXPECT_EQ(n.memory, Memory::kReversible);
   EXPECT_EQ(n.curve, (Curve{{0.25, 0.25}, {0.5, 0.375}}));
+}
+
+TEST_F(SceneLoad, ReadsTheModelsType) {
+  EXPECT_EQ(load_json(minimal(), {"/model/type=\"mass_spring\""}).model.type, ModelType::kMassSpring);
 }
 
 TEST_F(SceneLoad, ReadsWind) {
@@ -231,13 +249,13 @@ struct DefaultCase {
 
 TEST_F(SceneLoad, FillsInExactlyTheSchemasDefaults) {
   const Scene s = load_json(Json::parse(R"({
-    "name": "defaults", "frames": {"last": 2},
+    "name": "defaults", "frames": {"last": 2}, "motion": {"keys": [{"frame": 1}]},
     "head": {"mesh": "head.obj", "animation": {"keys": [{"frame": 1}]}},
     "groom": [{"file": "a.hair", "stiffness": [{"curve": [[0, 1]]}]}, {"grow": {"strands_per_triangle": 1}},
               {"file": "b.hair", "attach": "fixed"}, {"name": "few", "grow": {"strands": 5}}],
     "effects": {"inextensible": {}, "non_hookean": {}, "solids": [{"source": "head"}],
                 "wind": {"velocity": [1, 0, 0], "gusts": {}, "turbulence": {}, "shelter": {}}}})"));
-  const Key& key = s.head->animation.keys[0];
+  const Key &key = s.head->animation.keys[0], &carrier = s.head->animation.carrier[0];
   const Groom& groom = s.grooms[0];
   const Grow& grow = *s.grooms[1].grow;
   const Solid& solid = s.effects.solids[0];
@@ -280,6 +298,15 @@ TEST_F(SceneLoad, FillsInExactlyTheSchemasDefaults) {
       {props + "cache/properties/compression", "/cache/compression",
        word(is(s.cache.compression, Compression::kDefault), "default")},
       {props + "cache/properties/error", "/cache/error", s.cache.error},
+      {props + "motion/properties/interpolation", "/motion/interpolation",
+       word(is(s.head->animation.carrier_interpolation, Interpolation::kSmooth), "smooth")},
+      {props + "motion/properties/speed", "/motion/speed", s.head->animation.speed},
+      {props + "motion/properties/keys/items/properties/translate",
+       "/motion/keys/0/translate",
+       {carrier.translate.x(), carrier.translate.y(), carrier.translate.z()}},
+      {props + "motion/properties/keys/items/properties/rotate",
+       "/motion/keys/0/rotate",
+       {carrier.rotate.x(), carrier.rotate.y(), carrier.rotate.z(), carrier.rotate.w()}},
       {defs + "key/properties/translate",
        "/head/animation/keys/0/translate",
        {key.translate.x(), key.translate.y(), key.translate.z()}},
@@ -560,7 +587,6 @@ TEST_F(SceneLoad, KnowsEveryWordOfTheSchema) {
       {"/definitions/groom/properties/root_offset/enum", "/groom/0/root_offset"},
       {"/definitions/groom/properties/penetration/enum", "/groom/0/penetration"},
       {"/definitions/stiffness_scale/properties/coupling/enum", "/groom/0/stiffness/0/coupling"},
-      {"/definitions/model/properties/type/enum", "/model/type"},
       {"/definitions/model/properties/scheme/enum", "/model/scheme"},
       {"/definitions/model/properties/angular_tangent/enum", "/model/angular_tangent"},
       {"/definitions/model/properties/integrity_tangent/enum", "/model/integrity_tangent"},
@@ -571,10 +597,13 @@ TEST_F(SceneLoad, KnowsEveryWordOfTheSchema) {
   for (const auto& [in_schema, in_scene] : words)
     for (const Json& word : schema.at(Json::json_pointer(in_schema)))
       EXPECT_NO_THROW(load_json(full(), {std::string(in_scene) + "=" + word.dump()})) << in_scene << word;
+  for (const Json& word : schema.at("/definitions/model/properties/type/enum"_json_pointer))
+    EXPECT_NO_THROW(load_json(minimal(), {"/model/type=" + word.dump()}))
+        << "full() softens, which ams alone does";
   std::size_t enums = 0;
   each_value_schema(schema, "",
                     [&](const Json& node, const std::string&) { enums += node.contains("enum"); });
-  EXPECT_EQ(enums, std::size(words) + 1) << "all but cache.fields, which stay words";
+  EXPECT_EQ(enums, std::size(words) + 2) << "all but cache.fields, which stay words, and model.type";
 }
 
 }  // namespace

@@ -67,6 +67,9 @@ class SceneTest : public testing::Test {
       "name": "full",
       "frames": {"first": 1, "last": 96, "fps": 24, "preroll": 8},
       "units": {"length": "cm", "up": "z"},
+      "motion": {"keys": [{"frame": 1, "translate": [1, 0, 0], "rotate": [0, 0, 0, 1]},
+                          {"frame": 5, "translate": [2, 0, 0], "rotate": [0, 2, 0, 0]}],
+                 "interpolation": "linear", "speed": 3},
       "head": {
         "mesh": "head.obj",
         "units": {"length": "in", "up": "y"},

@@ -21,6 +21,23 @@ TEST(Keyframes, NoKeysIsIdentity) {
   EXPECT_EQ(s.scale, 1);
 }
 
+TEST(Keyframes, TheScenesMotionCarriesTheAssetsOwn) {
+  scene::Animation animation{};
+  animation.keys = {key(1, {0, 0, 0}), key(25, {1, 0, 0}, 0, 2)};
+  animation.carrier = {key(1, {0, 0, 0}), key(49, {0, 10, 0}, 90)};
+  animation.interpolation = animation.carrier_interpolation = kLinear;
+  const scene::Frames frames{1, 100, 24, 0};
+  const Vec3 local(0, 1, 0);
+  for (const double speed : {1.0, 3.0, 10.0}) {
+    animation.speed = speed;
+    const Similarity s = sample_animation(animation, frames, 0.5 / speed);  // frame 13 at speed 1
+    // The asset's own: 1.5 times as large, half a metre along x; then turned by 22.5 degrees and lifted.
+    const Vec3 own = 1.5 * local + Vec3(0.5, 0, 0);
+    const Vec3 expected = Eigen::AngleAxisd(std::numbers::pi / 8, Vec3::UnitZ()) * own + Vec3(0, 2.5, 0);
+    EXPECT_LT((s.rotate * (s.scale * local) + s.translate - expected).norm(), 1e-14) << speed;
+  }
+}
+
 TEST(Keyframes, HoldOutsideAndMeetEveryKey) {
   const std::vector<scene::Key> keys{key(1, {0, 0, 0}), key(3, {1, 5, 0}, 90, 2), key(10, {2, 0, 1}, 0, 0.5)};
   for (const auto interpolation : {kSmooth, kLinear}) {

@@ -50,6 +50,7 @@ class Builder {
     if (effects.contains("inextensible")) scene.effects.inextensible = inextensible(effects["inextensible"]);
     if (effects.contains("non_hookean")) scene.effects.non_hookean = non_hookean(effects["non_hookean"]);
     if (effects.contains("wind")) scene.effects.wind = wind(effects["wind"]);
+    if (effects.contains("grooming")) scene.effects.grooming = grooming(effects["grooming"]);
     for (std::size_t i = 0; i < effects["solids"].size(); ++i)
       scene.effects.solids.push_back(solid("/effects/solids" + pointer_token(i), effects["solids"][i]));
     scene.effects.collision = {effects["collision"]["iterations"]};
@@ -138,6 +139,8 @@ class Builder {
     groom.animation = animation(block["animation"]);
     for (const Json& scale : block["stiffness"])
       groom.stiffness.push_back({scale["group"], scale["coupling"], scale["curve"].get<Curve>()});
+    if (block.contains("interpolate"))
+      groom.interpolate = interpolate(pointer + "/interpolate", block["interpolate"]);
     groom.pointer = pointer;
     return groom;
   }
@@ -159,6 +162,12 @@ class Builder {
     grow.helix_impact = block["helix_impact"];
     grow.width = block["width"];
     return grow;
+  }
+
+  static Interpolate interpolate(const std::string& pointer, const Json& block) {
+    const auto strands = block.value("strands", std::vector<int>{});
+    return {block.value("count", 0), optional<std::string>(block, "group"), strands, block["neighbours"],
+            pointer};
   }
 
   static ScalpSelection scalp(const Json& block) {
@@ -194,6 +203,54 @@ class Builder {
         word<IntegrityTangent>(block["integrity_tangent"],
                                {{"exact", IntegrityTangent::kExact}, {"paper", IntegrityTangent::kPaper}});
     return model;
+  }
+
+  // In the order in which they are done.
+  std::vector<GroomingOperation> grooming(const Json& list) const {
+    std::vector<GroomingOperation> operations;
+    for (std::size_t i = 0; i < list.size(); ++i) {
+      const std::string pointer = "/effects/grooming" + pointer_token(i);
+      operations.push_back(grooming_operation(pointer, list[i]));
+    }
+    const auto earlier = [](const auto& a, const auto& b) { return a.frame < b.frame; };
+    std::stable_sort(operations.begin(), operations.end(), earlier);
+    return operations;
+  }
+
+  GroomingOperation grooming_operation(const std::string& pointer, const Json& block) const {
+    GroomingOperation operation{block["frame"], block.value("groom", ""), Rest{}, pointer};
+    if (block.contains("trim")) {
+      operation.pointer += "/trim";
+      operation.what = trim(operation.pointer, block["trim"]);
+    } else if (block.contains("lengthen")) {
+      operation.pointer += "/lengthen";
+      const Json& lengthen = block["lengthen"];
+      operation.what = Lengthen{optional<double>(lengthen, "by"), optional<double>(lengthen, "to"),
+                                optional<double>(lengthen, "factor"),
+                                word<Lengthening>(lengthen["mode"], {{"extend", Lengthening::kExtend},
+                                                                     {"scale", Lengthening::kScale}})};
+    } else if (block.contains("comb")) {
+      operation.pointer += "/comb";
+      const Json& comb = block["comb"];
+      std::vector<Vec3> curve;
+      for (const Json& point : comb["curve"]) curve.push_back(vec3(point));
+      operation.what = Comb{std::move(curve), comb["radius"], comb["strength"]};
+    } else {
+      operation.pointer += "/rest";
+    }
+    return operation;
+  }
+
+  Trim trim(const std::string& pointer, const Json& block) const {
+    Trim trim{};
+    if (block.contains("plane"))
+      trim.plane = {vec3(block["plane"]["point"]), vec3(block["plane"]["normal"]).normalized()};
+    if (block.contains("box")) trim.box = {vec3(block["box"][0]), vec3(block["box"][1])};
+    if (block.contains("sphere")) trim.sphere = {vec3(block["sphere"]["centre"]), block["sphere"]["radius"]};
+    if (block.contains("mesh")) trim.mesh = {path(block["mesh"]), units(block), {}, pointer + "/mesh"};
+    trim.keep_inside = block["keep"] == "inside";
+    trim.length = optional<double>(block, "length");
+    return trim;
   }
 
   static Inextensible inextensible(const Json& block) {
@@ -259,7 +316,10 @@ class Builder {
         word<Compression>(block["compression"], {{"default", Compression::kDefault},
                                                  {"none", Compression::kNone},
                                                  {"quantised", Compression::kQuantised}});
-    return {block["fields"], compression, block["error"]};
+    const auto strands = word<StoredStrands>(
+        block["strands"],
+        {{"all", StoredStrands::kAll}, {"guides", StoredStrands::kGuides}, {"both", StoredStrands::kBoth}});
+    return {block["fields"], strands, compression, block["error"]};
   }
 
   const Json& document_;

@@ -61,6 +61,7 @@ class Checks {
     for (const auto& [pointer, groom] : grooms_of(document_)) check_groom(pointer, *groom);
     non_hookean();
     wind();
+    grooming();
     const Json& solids = document_["effects"]["solids"];
     for (std::size_t i = 0; i < solids.size(); ++i) solid("/effects/solids" + pointer_token(i), solids[i]);
     cache();
@@ -109,6 +110,8 @@ class Checks {
       add(pointer + "/animation", "keys", "none with attach " + brief(attach),
           "only a fixed groom has its own motion");
     keys(pointer + "/animation", groom["animation"]);
+    if (groom.contains("interpolate"))
+      one_of(pointer + "/interpolate", groom["interpolate"], {"count", "group", "strands"});
     const Json& scales = groom["stiffness"];
     for (std::size_t i = 0; i < scales.size(); ++i)
       curve(pointer + "/stiffness" + pointer_token(i) + "/curve", scales[i]["curve"]);
@@ -127,12 +130,7 @@ class Checks {
           each ? "both strands and strands_per_triangle" : "neither strands nor strands_per_triangle above 0",
           "one of them");
     const Json& scalp = grow["scalp"];
-    if (scalp.contains("box"))
-      for (int axis = 0; axis < 3; ++axis)
-        if (scalp["box"][0][axis] > scalp["box"][1][axis]) {
-          add(pointer + "/grow/scalp/box", brief(scalp["box"]), "the lower corner, then the upper one");
-          break;
-        }
+    if (scalp.contains("box")) box(pointer + "/grow/scalp/box", scalp["box"]);
     if (scalp.contains("direction") && is_zero(scalp["direction"]))
       add(pointer + "/grow/scalp/direction", brief(scalp["direction"]), "a direction that is not zero");
   }
@@ -184,6 +182,83 @@ class Checks {
       add("/effects/wind/shelter", "shelter without a head", "a head in the scene");
   }
 
+  // Exactly one of `keys` stands in the block.
+  void one_of(const std::string& pointer, const Json& block, std::initializer_list<const char*> keys) {
+    std::string found, all;
+    for (const char* key : keys) {
+      all += (all.empty() ? "" : ", ") + std::string(key);
+      if (block.contains(key)) found += (found.empty() ? "" : " and ") + std::string(key);
+    }
+    if (found.empty() || found.find(" and ") != found.npos)
+      add(pointer, found.empty() ? "none of " + all : found, "one of " + all);
+  }
+
+  bool interpolates() const {
+    const auto grooms = grooms_of(document_);
+    return std::any_of(grooms.begin(), grooms.end(),
+                       [](const auto& groom) { return groom.second->contains("interpolate"); });
+  }
+
+  void grooming() {
+    if (!document_["effects"].contains("grooming")) return;
+    const std::string pointer = "/effects/grooming";
+    if (document_["model"]["type"] != "ams")
+      add(pointer, "grooming of strands of the model " + brief(document_["model"]["type"]),
+          "the model \"ams\"", "ringlet groom edits a groom before the run");
+    const Json& list = document_["effects"]["grooming"];
+    for (std::size_t i = 0; i < list.size(); ++i) grooming_operation(pointer + pointer_token(i), list[i]);
+  }
+
+  void grooming_operation(const std::string& pointer, const Json& operation) {
+    one_of(pointer, operation, {"trim", "lengthen", "comb", "rest"});
+    const Json& frames = document_["frames"];
+    if (operation["frame"] < frames["first"] || operation["frame"] > frames["last"])
+      add(pointer + "/frame", brief(operation["frame"]),
+          "a frame from first to last, " + brief(frames["first"]) + " to " + brief(frames["last"]));
+    groomed(pointer, operation);
+    if (operation.contains("trim")) trim(pointer + "/trim", operation["trim"]);
+    if (operation.contains("lengthen"))
+      one_of(pointer + "/lengthen", operation["lengthen"], {"by", "to", "factor"});
+    if (operation.contains("comb")) comb(pointer + "/comb/curve", operation["comb"]["curve"]);
+  }
+
+  // The grooms that an operation is for: there are some, and all their strands are simulated.
+  void groomed(const std::string& pointer, const Json& operation) {
+    bool found = false;
+    for (const auto& [groom_pointer, groom] : grooms_of(document_)) {
+      if (operation.contains("groom") && groom->value("name", "") != operation["groom"]) continue;
+      found = true;
+      if (groom->contains("interpolate"))
+        add(pointer, "an operation on interpolated strands",
+            "a groom without " + groom_pointer + "/interpolate",
+            "ringlet groom edits a groom before the run");
+    }
+    if (!found) add(pointer + "/groom", brief(operation["groom"]), "the name of a groom of the scene");
+  }
+
+  void trim(const std::string& pointer, const Json& trim) {
+    one_of(pointer, trim, {"plane", "box", "sphere", "mesh", "length"});
+    if (trim.contains("plane") && is_zero(trim["plane"]["normal"]))
+      add(pointer + "/plane/normal", brief(trim["plane"]["normal"]), "a direction that is not zero");
+    if (trim.contains("box")) box(pointer + "/box", trim["box"]);
+    if (trim.contains("length") && trim["keep"] == "inside")
+      add(pointer + "/keep", "\"inside\" with length", "none: a length keeps what is next to the root");
+    if (trim.contains("units") && !trim.contains("mesh"))
+      add(pointer + "/units", brief(trim["units"]), "none without mesh", "they are the mesh file's");
+  }
+
+  void comb(const std::string& pointer, const Json& curve) {
+    for (std::size_t i = 1; i < curve.size(); ++i)
+      if (curve[i] == curve[i - 1])
+        add(pointer + pointer_token(i), brief(curve[i]), "a point other than the one before");
+  }
+
+  void box(const std::string& pointer, const Json& box) {
+    for (int axis = 0; axis < 3; ++axis)
+      if (box[0][axis] > box[1][axis])
+        return add(pointer, brief(box), "the lower corner, then the upper one");
+  }
+
   void solid(const std::string& pointer, const Json& solid) {
     if (solid["source"] != "head") return keys(pointer + "/animation", solid["animation"]);
     if (!has_head())
@@ -201,6 +276,9 @@ class Checks {
     if (std::find(fields.begin(), fields.end(), "elongation") != fields.end() &&
         !document_["effects"].contains("non_hookean"))
       add("/cache/fields", "\"elongation\"", "none without effects.non_hookean");
+    const Json& strands = document_["cache"]["strands"];
+    if (strands != "all" && !interpolates())
+      add("/cache/strands", brief(strands), "\"all\" without a groom that interpolates");
   }
 
   void unique_names() {

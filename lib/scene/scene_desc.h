@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "core/geometry.h"
@@ -113,6 +114,15 @@ struct StiffnessScale {  // multiplies the model's stiffness along the strand
   Curve curve;
 };
 
+// Which strands of a groom are simulated as guides; the rest are skinned to them.
+struct Interpolate {
+  int count;                         // so many, spread over the roots; 0: not chosen by count
+  std::optional<std::string> group;  // or the strands of this group of the file
+  std::vector<int> strands;          // or these, by number
+  int neighbours;                    // guides that a strand follows: those with the nearest roots
+  std::string pointer;
+};
+
 struct Groom {
   std::string name;                           // for messages and the cache; unique in the scene
   std::optional<std::filesystem::path> file;  // either a file
@@ -126,6 +136,7 @@ struct Groom {
   Penetration penetration;
   Animation animation;  // attach fixed only
   std::vector<StiffnessScale> stiffness;
+  std::optional<Interpolate> interpolate;
   double width;  // [m] strand diameter where the file gives none
   std::string pointer;
 };
@@ -211,6 +222,52 @@ struct Wind {
   double linear_density;  // [kg/m]
 };
 
+// ---- Grooming: what is done to the strands of a groom file, or to those of a run at a frame. Places are in
+// the world, at that time.
+
+struct Plane {
+  Vec3 point, normal;  // [m], unit length
+};
+
+struct Sphere {
+  Vec3 centre;
+  double radius;
+};  // [m]
+
+// Cuts every strand where it first enters what is cut away, counted from its root. One of these is set.
+struct Trim {
+  std::optional<Plane> plane;              // inside: the side that the normal does not point to
+  std::optional<std::array<Vec3, 2>> box;  // [m] lower and upper corner
+  std::optional<Sphere> sphere;
+  std::optional<MeshDesc> mesh;  // closed
+  bool keep_inside;              // of plane, box, sphere or mesh; otherwise what is outside is kept
+  std::optional<double> length;  // [m] from the root along the rest shape: the rest goes
+};
+
+enum class Lengthening { kExtend, kScale };  // new particles at the tip, or the whole shape grown
+
+struct Lengthen {                // one of these is set
+  std::optional<double> by, to;  // [m]; `to` leaves longer strands alone
+  std::optional<double> factor;  // [-] at least 1
+  Lengthening mode;
+};
+
+// Turns the segments within reach of a curve towards it and along it; lengths stay.
+struct Comb {
+  std::vector<Vec3> curve;  // [m] two points or more, in the comb's direction
+  double radius;            // [m] reach
+  double strength;          // [-] at the curve itself: 0 nothing, 1 onto it
+};
+
+struct Rest {};  // the present shape becomes the rest shape
+
+struct GroomingOperation {
+  int frame;          // of a run: done when this frame has been stepped, before it is written
+  std::string groom;  // by name; empty: all
+  std::variant<Trim, Lengthen, Comb, Rest> what;
+  std::string pointer;  // of the operation, for messages: /effects/grooming/0/trim
+};
+
 struct Solid {
   bool is_head;                   // "source": "head"
   std::optional<MeshDesc> mesh;   // otherwise a mesh of its own
@@ -233,7 +290,8 @@ struct Effects {
   std::optional<Vec3> gravity;  // [m/s^2]
   std::optional<Inextensible> inextensible;
   std::optional<NonHookean> non_hookean;
-  std::optional<Wind> wind;  // one that blows at some time
+  std::optional<Wind> wind;                 // one that blows at some time
+  std::vector<GroomingOperation> grooming;  // by frame, those of a frame in the scene's order
   std::vector<Solid> solids;
   Collision collision;
 };
@@ -243,10 +301,13 @@ struct Limits {
   double speed;
 };  // [-], [m/s]: beyond them the run has diverged
 
+enum class StoredStrands { kAll, kGuides, kBoth };  // where a groom interpolates
+
 enum class Compression { kNone, kDefault, kQuantised };
 
 struct Cache {
   std::vector<std::string> fields;  // position, velocity, elongation, solids
+  StoredStrands strands;
   Compression compression;
   double error;  // [m] largest position error of `quantised`
 };

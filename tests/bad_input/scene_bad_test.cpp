@@ -31,7 +31,8 @@ constexpr Case kSchemaCases[] = {
     {R"({"limits": {"temperature": 5}})",
      "scene#/limits/temperature: found an unknown key, expected one of edge_strain, speed"},
     {R"({"effects": {"smoke": {}}})",
-     "scene#/effects/smoke: found an unknown key, expected one of collision, gravity, inextensible, "
+     "scene#/effects/smoke: found an unknown key, expected one of collision, gravity, grooming, "
+     "inextensible, "
      "non_hookean, solids, wind"},
     {R"({"units": {"a/b~c": 1}})", "scene#/units/a~1b~0c: found an unknown key, expected one of length, up"},
     // type
@@ -176,6 +177,40 @@ constexpr Case kMeaningCases[] = {
      "scene#/effects/wind/keys/1/frame: found 1.0, expected a frame after the previous key's 2.0"},
     {R"({"effects": {"wind": {"velocity": [0, 1, 0], "shelter": {}}}})",
      "scene#/effects/wind/shelter: found shelter without a head, expected a head in the scene"},
+    // grooming and interpolation
+    {R"({"effects": {"grooming": [{"frame": 3, "trim": {}}]}})",
+     "scene#/effects/grooming/0/frame: found 3, expected a frame from first to last, 1 to 2\n"
+     "scene#/effects/grooming/0/trim: found none of plane, box, sphere, mesh, length, expected one of plane, "
+     "box, sphere, mesh, length"},
+    {R"({"effects": {"grooming": [{"frame": 1, "groom": "wig", "rest": {}, "lengthen": {"by": 1, "to": 2}}]}})",
+     "scene#/effects/grooming/0: found lengthen and rest, expected one of trim, lengthen, comb, rest\n"
+     "scene#/effects/grooming/0/groom: found \"wig\", expected the name of a groom of the scene\n"
+     "scene#/effects/grooming/0/lengthen: found by and to, expected one of by, to, factor"},
+    {R"({"effects": {"grooming": [{"frame": 1, "trim": {"plane": {"point": [0, 0, 0], "normal": [0, 0, 0]}}},
+                                  {"frame": 1, "trim": {"box": [[0, 1, 0], [1, 0, 1]]}},
+                                  {"frame": 1, "trim": {"length": 1, "keep": "inside", "units": {}}},
+                                  {"frame": 1, "comb": {"curve": [[0, 0, 0], [0, 0, 0]], "radius": 1}}]}})",
+     "scene#/effects/grooming/0/trim/plane/normal: found [0.0,0.0,0.0], expected a direction that is not "
+     "zero\n"
+     "scene#/effects/grooming/1/trim/box: found [[0.0,1.0,0.0],[1.0,0.0,1.0]], expected the lower corner, "
+     "then the upper one\n"
+     "scene#/effects/grooming/2/trim/keep: found \"inside\" with length, expected none: a length keeps what "
+     "is "
+     "next to the root\n"
+     "scene#/effects/grooming/2/trim/units: found {}, expected none without mesh (they are the mesh file's)\n"
+     "scene#/effects/grooming/3/comb/curve/1: found [0.0,0.0,0.0], expected a point other than the one "
+     "before"},
+    {R"({"model": {"type": "mass_spring"}, "effects": {"grooming": [{"frame": 1, "rest": {}}]}})",
+     R"(scene#/effects/grooming: found grooming of strands of the model "mass_spring", expected the model "ams" (ringlet groom edits a groom before the run))"},
+    {R"({"groom": {"interpolate": {"count": 2}}, "effects": {"grooming": [{"frame": 1, "rest": {}}]}})",
+     "scene#/effects/grooming/0: found an operation on interpolated strands, expected a groom without "
+     "/groom/interpolate (ringlet groom edits a groom before the run)"},
+    {R"({"groom": {"interpolate": {}}})",
+     "scene#/groom/interpolate: found none of count, group, strands, expected one of count, group, strands"},
+    {R"({"groom": {"interpolate": {"count": 2, "strands": [1]}}})",
+     "scene#/groom/interpolate: found count and strands, expected one of count, group, strands"},
+    {R"({"cache": {"strands": "guides"}})",
+     R"(scene#/cache/strands: found "guides", expected "all" without a groom that interpolates)"},
     // solids
     {R"({"effects": {"solids": [{"source": "head"}]}})",
      R"(scene#/effects/solids/0/source: found "head" without a head, expected a head in the scene, or a mesh file)"},

@@ -119,7 +119,7 @@ TEST_F(SceneLoad, ReadsTheScenesMotionIntoEveryAnimation) {
 
 TEST_F(SceneLoad, ReadsGrooms) {
   const Scene s = load_json(full());
-  ASSERT_EQ(s.grooms.size(), 3u);
+  ASSERT_EQ(s.grooms.size(), 4u);
   EXPECT_EQ(s.grooms[0].name, "a") << "the file's";
   EXPECT_EQ(s.grooms[0].file, folder_ / "a.hair");
   EXPECT_THAT(s.grooms[0].more, testing::ElementsAre(folder_ / "b.hair"));
@@ -167,6 +167,48 @@ TEST_F(SceneLoad, ReadsTheNonHookeanCurve) {
   const NonHookean n = load_json(full()).effects.non_hookean.value();
   EXPECT_EQ(n.memory, Memory::kReversible);
   EXPECT_EQ(n.curve, (Curve{{0.25, 0.25}, {0.5, 0.375}}));
+}
+
+TEST_F(SceneLoad, ReadsInterpolation) {
+  const Scene s = load_json(full());
+  EXPECT_EQ(s.grooms[0].interpolate->group, "b");
+  EXPECT_EQ(s.grooms[0].interpolate->count, 0);
+  EXPECT_EQ(s.grooms[0].interpolate->neighbours, 2);
+  EXPECT_EQ(s.grooms[0].interpolate->pointer, "/groom/0/interpolate");
+  EXPECT_THAT(s.grooms[1].interpolate->strands, testing::ElementsAre(0, 2));
+  EXPECT_EQ(s.grooms[2].interpolate->count, 10);
+  EXPECT_FALSE(s.grooms[3].interpolate);
+  EXPECT_EQ(s.cache.strands, StoredStrands::kBoth);
+}
+
+TEST_F(SceneLoad, ReadsGroomingInItsOrder) {
+  const Scene s = load_json(full());
+  const auto& operations = s.effects.grooming;
+  ASSERT_EQ(operations.size(), 10u);
+  const auto trim = [&](std::size_t i) { return std::get<Trim>(operations[i].what); };
+  EXPECT_EQ(operations[0].frame, 8) << "by frame";
+  EXPECT_EQ(operations[0].groom, "cut");
+  EXPECT_EQ(operations[0].pointer, "/effects/grooming/3/trim");
+  EXPECT_EQ(trim(0).mesh->file, folder_ / "sphere.obj");
+  EXPECT_EQ(trim(0).mesh->units.metres_per_unit, 0.3048);
+  EXPECT_EQ(trim(0).mesh->units.up, Axis::kY);
+  EXPECT_TRUE(trim(1).plane->point.isApprox(Vec3(0.01, 0.02, 0.03)));
+  EXPECT_EQ(trim(1).plane->normal, Vec3(0, 0, 1));
+  EXPECT_TRUE((*trim(2).box)[1].isApprox(Vec3(0.03, 0.04, 0.05)));
+  EXPECT_TRUE(trim(2).keep_inside);
+  EXPECT_FALSE(trim(3).keep_inside);
+  EXPECT_EQ(trim(3).sphere->radius, 0.04);
+  EXPECT_EQ(std::get<Lengthen>(operations[4].what).by, 0.05);
+  EXPECT_EQ(std::get<Lengthen>(operations[5].what).to, 0.5);
+  EXPECT_EQ(std::get<Lengthen>(operations[6].what).factor, 1.5);
+  EXPECT_EQ(std::get<Lengthen>(operations[6].what).mode, Lengthening::kScale);
+  const Comb comb = std::get<Comb>(operations[7].what);
+  EXPECT_TRUE(comb.curve[1].isApprox(Vec3(0.01, 0.02, 0.03)));
+  EXPECT_EQ(comb.radius, 0.02);
+  EXPECT_EQ(comb.strength, 0.5);
+  EXPECT_TRUE(std::holds_alternative<Rest>(operations[8].what));
+  EXPECT_EQ(operations[8].pointer, "/effects/grooming/9/rest");
+  EXPECT_EQ(trim(9).length, 0.05);
 }
 
 TEST_F(SceneLoad, ReadsTheModelsType) {
@@ -252,8 +294,12 @@ TEST_F(SceneLoad, FillsInExactlyTheSchemasDefaults) {
     "name": "defaults", "frames": {"last": 2}, "motion": {"keys": [{"frame": 1}]},
     "head": {"mesh": "head.obj", "animation": {"keys": [{"frame": 1}]}},
     "groom": [{"file": "a.hair", "stiffness": [{"curve": [[0, 1]]}]}, {"grow": {"strands_per_triangle": 1}},
-              {"file": "b.hair", "attach": "fixed"}, {"name": "few", "grow": {"strands": 5}}],
-    "effects": {"inextensible": {}, "non_hookean": {}, "solids": [{"source": "head"}],
+              {"file": "b.hair", "attach": "fixed"},
+              {"name": "few", "grow": {"strands": 5}, "interpolate": {"count": 2}}],
+    "effects": {"grooming": [{"frame": 1, "groom": "b", "trim": {"box": [[0, 0, 0], [1, 1, 1]]}},
+                             {"frame": 1, "groom": "b", "lengthen": {"by": 1}},
+                             {"frame": 1, "groom": "b", "comb": {"curve": [[0, 0, 0], [1, 1, 1]], "radius": 1}}],
+                "inextensible": {}, "non_hookean": {}, "solids": [{"source": "head"}],
                 "wind": {"velocity": [1, 0, 0], "gusts": {}, "turbulence": {}, "shelter": {}}}})"));
   const Key &key = s.head->animation.keys[0], &carrier = s.head->animation.carrier[0];
   const Groom& groom = s.grooms[0];
@@ -292,9 +338,19 @@ TEST_F(SceneLoad, FillsInExactlyTheSchemasDefaults) {
       {air + "linear_density", "/effects/wind/linear_density", wind.linear_density},
       {air + "shelter/properties/strength", "/effects/wind/shelter/strength", wind.shelter->strength},
       {air + "shelter/properties/wake", "/effects/wind/shelter/wake", wind.shelter->wake},
+      {defs + "trim/properties/keep", "/effects/grooming/0/trim/keep",
+       word(!std::get<Trim>(s.effects.grooming[0].what).keep_inside, "outside")},
+      {defs + "lengthen/properties/mode", "/effects/grooming/1/lengthen/mode",
+       word(is(std::get<Lengthen>(s.effects.grooming[1].what).mode, Lengthening::kExtend), "extend")},
+      {defs + "comb/properties/strength", "/effects/grooming/2/comb/strength",
+       std::get<Comb>(s.effects.grooming[2].what).strength},
+      {defs + "interpolate/properties/neighbours", "/groom/3/interpolate/neighbours",
+       s.grooms[3].interpolate->neighbours},
       {props + "limits/properties/edge_strain", "/limits/edge_strain", s.limits.edge_strain},
       {props + "limits/properties/speed", "/limits/speed", s.limits.speed},
       {props + "cache/properties/fields", "/cache/fields", s.cache.fields},
+      {props + "cache/properties/strands", "/cache/strands",
+       word(is(s.cache.strands, StoredStrands::kAll), "all")},
       {props + "cache/properties/compression", "/cache/compression",
        word(is(s.cache.compression, Compression::kDefault), "default")},
       {props + "cache/properties/error", "/cache/error", s.cache.error},
@@ -423,11 +479,11 @@ TEST_F(SceneLoad, TakesThePapersVariantsFromItsScheme) {
 
 TEST_F(SceneLoad, AppliesOverridesInOrder) {
   const Scene s =
-      load_json(full(), {"/frames/last=10", "/frames/last=12", "/effects/gravity=null",
+      load_json(full(), {"/frames/last=100", "/frames/last=120", "/effects/gravity=null",
                          "/effects/solids/1=null", "/effects/solids/-={\"source\": \"sphere.obj\"}",
                          "/effects/solids/1/friction=0.9", "/cache=null", "/effects/no/such/thing=null",
                          "/effects/solids/7=null", "/name=\"a=b\"", "/name=\"wedge\""});
-  EXPECT_EQ(s.frames.last, 12);
+  EXPECT_EQ(s.frames.last, 120);
   EXPECT_FALSE(s.effects.gravity);
   ASSERT_EQ(s.effects.solids.size(), 2u);
   EXPECT_EQ(s.effects.solids[1].name, "sphere");
@@ -458,10 +514,10 @@ TEST_F(SceneLoad, RefusesMalformedOverrides) {
   EXPECT_THAT(error("/limits/speed=1e999"), testing::HasSubstr("number overflow parsing '1e999'"));
   EXPECT_EQ(error("/name/first=1"),
             "--set /name/first=1: 'first' is no member of \"tiny\", which is no object or list");
-  EXPECT_EQ(error_of_text(full().dump(), {"/groom/4/name=\"x\""}, ErrorKind::kUsage),
-            "--set /groom/4/name=\"x\": '4' is no index of a list of 3 (0 to 3, or - to append)");
+  EXPECT_EQ(error_of_text(full().dump(), {"/groom/5/name=\"x\""}, ErrorKind::kUsage),
+            "--set /groom/5/name=\"x\": '5' is no index of a list of 4 (0 to 4, or - to append)");
   EXPECT_EQ(error_of_text(full().dump(), {"/groom/01/name=\"x\""}, ErrorKind::kUsage),
-            "--set /groom/01/name=\"x\": '01' is no index of a list of 3 (0 to 3, or - to append)");
+            "--set /groom/01/name=\"x\": '01' is no index of a list of 4 (0 to 4, or - to append)");
 }
 
 TEST_F(SceneLoad, SaysThatAnOverrideIsToBlame) {
@@ -592,6 +648,9 @@ TEST_F(SceneLoad, KnowsEveryWordOfTheSchema) {
       {"/definitions/model/properties/integrity_tangent/enum", "/model/integrity_tangent"},
       {"/definitions/inextensible/properties/per/enum", "/effects/inextensible/per"},
       {"/definitions/non_hookean/properties/memory/enum", "/effects/non_hookean/memory"},
+      {"/definitions/trim/properties/keep/enum", "/effects/grooming/1/trim/keep"},
+      {"/definitions/lengthen/properties/mode/enum", "/effects/grooming/7/lengthen/mode"},
+      {"/properties/cache/properties/strands/enum", "/cache/strands"},
       {"/properties/cache/properties/compression/enum", "/cache/compression"},
   };
   for (const auto& [in_schema, in_scene] : words)

@@ -82,16 +82,19 @@ class SceneTest : public testing::Test {
       "groom": [
         {"file": ["a.hair", "b.hair"], "attach": "nearest", "attach_distance": 3, "penetration": "keep",
          "units": {"length": 0.5, "up": "x"}, "width": 0.01,
-         "stiffness": [{"group": "a", "coupling": "edge", "curve": [[0, 1], [0.5, 0.25]]}]},
+         "stiffness": [{"group": "a", "coupling": "edge", "curve": [[0, 1], [0.5, 0.25]]}],
+         "interpolate": {"group": "b", "neighbours": 2}},
         {"name": "skin", "file": "c.tfx", "skin": "c.tfxskin", "attach": "fixed",
          "animation": {"interpolation": "smooth",
-                       "keys": [{"frame": 1, "translate": [10, 0, 0], "rotate": [0, 0, 0, 1], "scale": 1}]}},
+                       "keys": [{"frame": 1, "translate": [10, 0, 0], "rotate": [0, 0, 0, 1], "scale": 1}]},
+         "interpolate": {"strands": [0, 2]}},
         {"grow": {
           "scalp": {"mesh": "scalp", "box": [[0, 1, 2], [3, 4, 5]], "direction": [0, 0, 2], "max_angle_degrees": 60},
           "strands_per_triangle": 3, "strands": 0, "seed": 7, "particles": 12, "step": 0.5, "length_variation": 0.25,
           "direction_noise": 0.5, "gravity_influence": 0.03, "max_deviation": 0.3, "helix_radius": 5,
           "helix_frequency": 2, "helix_impact": 0.02, "width": 0.02},
-         "root_offset": "snap"}
+         "root_offset": "snap", "interpolate": {"count": 10}},
+        {"name": "cut", "file": "b.hair", "attach": "fixed"}
       ],
       "model": {
         "type": "ams", "scheme": "projected",
@@ -112,6 +115,18 @@ class SceneTest : public testing::Test {
           "normal_drag": {"linear": 1e-4, "quadratic": 2e-5}, "tangential_drag": {"linear": 3e-4, "quadratic": 4e-5},
           "linear_density": 1e-5, "shelter": {"strength": 0.5, "wake": 30}
         },
+        "grooming": [
+          {"frame": 9, "groom": "cut", "trim": {"plane": {"point": [1, 2, 3], "normal": [0, 0, 2]}}},
+          {"frame": 9, "groom": "cut", "trim": {"box": [[0, 1, 2], [3, 4, 5]], "keep": "inside"}},
+          {"frame": 9, "groom": "cut", "trim": {"sphere": {"centre": [1, 2, 3], "radius": 4}}},
+          {"frame": 8, "groom": "cut", "trim": {"mesh": "sphere.obj", "units": {"length": "ft", "up": "y"}}},
+          {"frame": 96, "groom": "cut", "trim": {"length": 5}},
+          {"frame": 10, "groom": "cut", "lengthen": {"by": 5}},
+          {"frame": 11, "groom": "cut", "lengthen": {"to": 50}},
+          {"frame": 12, "groom": "cut", "lengthen": {"factor": 1.5, "mode": "scale"}},
+          {"frame": 13, "groom": "cut", "comb": {"curve": [[0, 0, 0], [1, 2, 3]], "radius": 2, "strength": 0.5}},
+          {"frame": 14, "groom": "cut", "rest": {}}
+        ],
         "solids": [
           {"source": "head", "proxy": "proxy.obj", "friction": 0.3, "offset": 0.1, "voxel": 0.2, "resolution": 64,
            "half_width": 4, "level_set_cache": "levels"},
@@ -121,7 +136,7 @@ class SceneTest : public testing::Test {
         "collision": {"iterations": 6}
       },
       "limits": {"edge_strain": 5, "speed": 500},
-      "cache": {"fields": ["position", "velocity"], "compression": "quantised", "error": 0.001}
+      "cache": {"fields": ["position", "velocity"], "strands": "both", "compression": "quantised", "error": 0.001}
     })");
   }
 

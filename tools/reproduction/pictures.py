@@ -1,0 +1,109 @@
+"""Pictures of runs and plots of their numbers, small enough for the repository."""
+import io
+
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+
+LARGEST = 300_000  # bytes of a PNG
+INK = (70, 70, 75)
+GAP = 4  # pixels between pictures
+
+VIEWS = {"front": (0, 5), "side": (90, 5), "back": (180, 10), "three-quarter": (38, 8), "top": (0, 80)}
+
+
+# ---- Renders -----------------------------------------------------------------------------------------------------
+
+
+def render(run, frame, camera=None, view="three-quarter", size=(320, 320), samples=16, colour="brown", strands=None,
+           position=None):
+    """A picture of a frame. `camera` of shared_camera() for pictures that are to be compared; `strands`: indices of those
+    to draw; `position`: drawn in place of the frame's."""
+    import studio
+
+    camera = camera or shared_camera([(run, frame)], view, size)
+    position = run.position(frame) if position is None else position
+    keep = np.zeros(len(run.roots), bool)
+    keep[slice(None) if strands is None else strands] = True
+    strand = np.repeat(np.arange(len(run.counts)), run.counts)
+    keep[strand[~np.isfinite(position).all(1)]] = False
+    particles = keep[strand]
+    offsets = np.concatenate([[0], np.cumsum(run.counts[keep])])
+    width = np.maximum(run.cache.width.astype(float), studio.THINNEST * camera.pixel)
+    pixels = studio.picture(
+        position[particles], width[particles], offsets, run.surfaces(frame), camera, samples, colour
+    )
+    return Image.fromarray(pixels)
+
+
+def shared_camera(runs_and_frames, view="three-quarter", size=(320, 320), surfaces=True, points=None):
+    """A camera that sees the hair of all (run, frame) and what of the solids is near it; or `points`."""
+    import studio
+
+    if points is None:
+        hair = np.concatenate([run.position(frame) for run, frame in runs_and_frames])
+        hair = hair[np.isfinite(hair).all(1)]
+        reach = 0.2 * np.linalg.norm(hair.max(0) - hair.min(0))
+        low, high = hair.min(0) - reach, hair.max(0) + reach
+        points = [hair]
+        for run, frame in runs_and_frames if surfaces else []:
+            points += [v[((v > low) & (v < high)).all(1)] for v, _ in run.surfaces(frame)]
+        points = np.concatenate(points)
+    return studio.fit_camera(np.asarray(points, float), VIEWS.get(view, view), "y", size)
+
+
+def titled(image, text):
+    """The picture with a line of text in its upper left corner."""
+    image = image.copy()
+    font = ImageFont.load_default(size=max(11, image.height // 22))
+    ImageDraw.Draw(image).text((image.height // 40, image.height // 60), text, fill=INK, font=font, spacing=2)
+    return image
+
+
+def sheet(rows):
+    """One picture of rows of pictures; the rows may be of different lengths."""
+    widths = [sum(image.width + GAP for image in row) - GAP for row in rows]
+    heights = [max(image.height for image in row) for row in rows]
+    out = Image.new("RGB", (max(widths), sum(height + GAP for height in heights) - GAP), (255, 255, 255))
+    top = 0
+    for row, height in zip(rows, heights):
+        left = 0
+        for image in row:
+            out.paste(image, (left, top))
+            left += image.width + GAP
+        top += height + GAP
+    return out
+
+
+def save(image, path):
+    """Writes a PNG of LARGEST bytes at most: of fewer colours, then of fewer pixels, until it is."""
+    image = image.convert("RGB")
+    while True:
+        for colours in (256, 128, 64):
+            data = io.BytesIO()
+            image.quantize(colours, dither=Image.Dither.NONE).save(data, "png", optimize=True)
+            if len(data.getvalue()) <= LARGEST:
+                path.write_bytes(data.getvalue())
+                return
+        image = image.resize((int(0.87 * image.width), int(0.87 * image.height)), Image.Resampling.LANCZOS)
+
+
+# ---- Plots -------------------------------------------------------------------------------------------------------
+
+
+def plot(path, draw, columns=1, width=6.4, height=3.6):
+    """Calls draw(axes) (of one row; a list where columns > 1) and saves the figure."""
+    import matplotlib
+
+    matplotlib.use("agg")
+    from matplotlib import pyplot
+
+    figure, axes = pyplot.subplots(1, columns, figsize=(width, height), dpi=100, squeeze=False)
+    draw(axes[0] if columns > 1 else axes[0][0])
+    for each in axes[0]:
+        each.grid(alpha=0.3)
+        each.spines[["top", "right"]].set_visible(False)
+    figure.tight_layout()
+    data = io.BytesIO()
+    figure.savefig(data, format="png", metadata={"Software": None})
+    pyplot.close(figure)
+    save(Image.open(data), path)

@@ -55,18 +55,19 @@ def thinned(scene, share):
 # ---- Runs --------------------------------------------------------------------------------------------------------
 
 
-def run_scene(scene, label, overrides=None, frames=None, work=WORK):
+def run_scene(scene, label, overrides=None, frames=None, work=WORK, options=()):
     """Runs scenes/paper/SCENE.json with `overrides` ({pointer: value}) into work/LABEL and returns the Run. Divergence is
-    a result (Run.diverged_frame); any other failure raises RunError. `frames`: write only up to this one."""
+    a result (Run.diverged_frame); any other failure raises RunError. `frames`: write only up to this one; `options`: of
+    the program, as they stand on its command line."""
     path = SCENES / f"{scene}.json"
     settings = dict(overrides or {})
     if frames is not None:
         settings["/frames/last"] = frames
     out = pathlib.Path(work) / label
-    stamp = _stamp(path, settings)
+    stamp = _stamp(path, [settings, *options])
     record = out / "run.json"
     if not (record.exists() and json.loads(record.read_text())["stamp"] == stamp):
-        command = [PROGRAM, "run", path, "-o", out, "--overwrite", "--progress", "none"]
+        command = [PROGRAM, "run", path, "-o", out, "--overwrite", "--progress", "none", *options]
         for pointer, value in settings.items():
             command += ["--set", f"{pointer}={json.dumps(value)}"]
         print(f"figures: {label}", file=sys.stderr, flush=True)
@@ -282,13 +283,22 @@ class Figures:
         self.name, self.output, self.quick = name, pathlib.Path(output), quick
         self.output.mkdir(parents=True, exist_ok=True)
 
-    def run(self, scene, label=None, overrides=None, frames=None):
+    @property
+    def look(self):
+        """Options of pictures.render(): how fine."""
+        return {"samples": 4 if self.quick else 24}
+
+    def size(self, width, height=None):
+        """Pixels of one picture, with --quick a third."""
+        return tuple(side // 3 if self.quick else side for side in (width, height or width))
+
+    def run(self, scene, label=None, overrides=None, frames=None, options=()):
         """run_scene; with --quick a tenth of the strands that the scene grows, unless `overrides` say how many."""
         overrides = dict(overrides or {})
         if self.quick:
             overrides = thinned(read_scene(scene), 0.1) | overrides
         folder = WORK / ("quick-runs" if self.quick else "runs")
-        return run_scene(scene, f"{self.name}/{label or scene}", overrides, frames, folder)
+        return run_scene(scene, f"{self.name}/{label or scene}", overrides, frames, folder, options)
 
     def path(self, suffix):
         """docs/figures/NAME + suffix, for instance '.png' or '_strain.png'."""

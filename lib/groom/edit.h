@@ -1,0 +1,50 @@
+// Grooming operations on single strands: trim, lengthen, comb, re-rest. The same code edits groom files and
+// the strands of a run.
+#pragma once
+#include <functional>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/geometry.h"
+#include "groom/strands.h"
+#include "scene/scene_desc.h"
+
+namespace ringlet::groom {
+
+// A strand under the scissors, root first: its rest shape, and where it is now. Of a groom file both are the
+// same and nothing moves. The three arrays are of one length, at least 1.
+struct EditedStrand {
+  std::vector<Vec3> rest;      // in the axes of the rest pose [m]
+  std::vector<Vec3> position;  // in the world [m]
+  std::vector<Vec3> velocity;  // [m/s]
+  Mat3 rotation;               // of the root's frame, from the rest pose to now
+  double spacing = 0;          // [m] least distance of particles that are added; of a run, that of its start
+};
+
+// The distance at which a strand of this rest shape would be continued [m]: its mean segment, a short last
+// one aside. 0 for a strand without length.
+double spacing(std::span<const Vec3> rest);
+
+// How far outside a shape a point is [m], negative inside.
+using SignedDistance = std::function<double(const Vec3&)>;
+
+// Does `operation` to a strand; true where that changed it. `cutter`: the distance to the mesh of a trim by
+// mesh. Prescribed particles (the root) stay. A strand whose root is cut away keeps its root alone.
+bool edit(EditedStrand& strand, const scene::GroomingOperation& operation, const SignedDistance& cutter = {});
+
+// The most particles that a strand of `rest` can come to have by `operations`, whatever its position, with
+// its `spacing` that of `rest`.
+std::size_t most_particles(std::span<const Vec3> rest, std::span<const scene::GroomingOperation> operations);
+
+// Does `operation` to every strand of a groom (its `groom` and `frame` aside), widths following. Strands cut
+// down to their root are gone. Throws Error{kInput} at operation.pointer where nothing is left: no strand of
+// two particles or more. `cutter` is called from several threads at once.
+void edit(Strands& strands, const scene::GroomingOperation& operation, const SignedDistance& cutter = {});
+
+// Every strand with `particles` particles, or with segments as near to `step` [m] as divides its length
+// evenly: on the smooth curve through its points, equally spaced along it. Root and tip stay exactly. Widths
+// are interpolated. One of the two is set.
+Strands resample(const Strands& strands, std::optional<int> particles, std::optional<double> step);
+
+}  // namespace ringlet::groom

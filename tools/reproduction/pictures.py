@@ -35,6 +35,13 @@ def render(run, frame, camera=None, view="three-quarter", size=(320, 320), sampl
     return Image.fromarray(pixels)
 
 
+def strip(run, frames, camera, label, **options):
+    """A row of pictures of a run, the frame and `label` written on each. Its last frame stands in for those that it did
+    not reach."""
+    reached = [min(frame, run.frames[-1]) for frame in frames]
+    return [titled(render(run, frame, camera, **options), f"{label} {frame}") for frame in reached]
+
+
 def shared_camera(runs_and_frames, view="three-quarter", size=(320, 320), surfaces=True, points=None):
     """A camera that sees the hair of all (run, frame) and what of the solids is near it; or `points`."""
     import studio

@@ -1,1 +1,1 @@
-ringlet_test(solids ringlet::solids TBB::tbb fmt::fmt-header-only)
+ringlet_test(solids ringlet::solids ringlet::oracle TBB::tbb fmt::fmt-header-only)

@@ -20,6 +20,7 @@ class Snapshot:
 
     label: str
     position: np.ndarray  # [particles, 3]
+    living: np.ndarray  # [strands] particles that are there; those beyond the tip lie on it
     surfaces: list  # of (vertices [n, 3], triangles [m, 3])
 
 
@@ -68,7 +69,8 @@ class StrandCache:
         surfaces = file.get("surfaces", {})
         posed = [name for name in self._triangles if name in surfaces and "vertices" in surfaces[name]]
         meshes = [(read(surfaces[name]["vertices"]), self._triangles[name]) for name in posed]
-        return Snapshot(label, read(file["position"]), meshes)
+        living = read(file["living"]) if "living" in file else np.diff(self.offsets)
+        return Snapshot(label, read(file["position"]), living, meshes)
 
 
 def _header_file(path):

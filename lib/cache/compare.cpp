@@ -36,7 +36,8 @@ bool same_bits(const std::vector<T>& a, const std::vector<T>& b) {
 
 bool identical(const Frame& a, const Frame& b) {
   return same_bits(a.position, b.position) && same_bits(a.velocity, b.velocity) &&
-         same_bits(a.elongation, b.elongation) &&
+         same_bits(a.elongation, b.elongation) && same_bits(a.living, b.living) &&
+         same_bits(a.guide_position, b.guide_position) &&
          std::equal(a.surface_vertices.begin(), a.surface_vertices.end(), b.surface_vertices.begin(),
                     b.surface_vertices.end(), same_bits<float>);
 }

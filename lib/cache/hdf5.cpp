@@ -262,16 +262,16 @@ Object Object::write_string(const std::string& name, const std::string& value) c
   return write_array(name, type, &pointer, 1, {});
 }
 
-Object Object::write_virtual(const std::string& name, hsize_t rows, const Dims& source_dims,
-                             const std::string& source, const std::vector<Mapping>& mappings) const {
+Object Object::make_virtual(const std::string& name, hsize_t rows, const Dims& source_dims,
+                            const std::string& source, const std::vector<Mapping>& mappings, hid_t type,
+                            const void* missing) const {
   Dims dims = source_dims;
   dims.insert(dims.begin(), rows);
   Dims start(dims.size(), 0), count = dims;
   count[0] = 1;
   const Id extent = space(dims), source_extent = space(source_dims),
            properties = object_properties(H5P_DATASET_CREATE);
-  const float missing = std::numeric_limits<float>::quiet_NaN();
-  H5Pset_fill_value(properties, H5T_NATIVE_FLOAT, &missing);
+  H5Pset_fill_value(properties, type, missing);
   for (const Mapping& mapping : mappings) {
     start[0] = mapping.row;
     H5Sselect_hyperslab(extent, H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr);
@@ -279,8 +279,7 @@ Object Object::write_virtual(const std::string& name, hsize_t rows, const Dims& 
           name + " cannot present " + mapping.file);
   }
   H5Sselect_all(extent);
-  const hid_t made =
-      H5Dcreate2(id_, name.c_str(), H5T_IEEE_F32LE, extent, H5P_DEFAULT, properties, H5P_DEFAULT);
+  const hid_t made = H5Dcreate2(id_, name.c_str(), type, extent, H5P_DEFAULT, properties, H5P_DEFAULT);
   return {Id(check(made, name + " not made"), H5Dclose), file_, child_path(name)};
 }
 

@@ -9,9 +9,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <span>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -109,9 +111,14 @@ class Object {
   Object write_deflated(const std::string& name, std::span<const float> values, const Dims& dims) const;
   Object write_strings(const std::string& name, const std::vector<std::string>& values) const;
   Object write_string(const std::string& name, const std::string& value) const;
-  // [rows, dims of a source ...] of float; rows without a mapping, and those whose file is gone, read as NaN.
+  // [rows, dims of a source ...] of float or int32; rows without a mapping, and those whose file is gone,
+  // read as NaN or -1.
+  template <class T>
   Object write_virtual(const std::string& name, hsize_t rows, const Dims& source_dims,
-                       const std::string& source, const std::vector<Mapping>& mappings) const;
+                       const std::string& source, const std::vector<Mapping>& mappings) const {
+    const T missing = std::is_floating_point_v<T> ? std::numeric_limits<T>::quiet_NaN() : T(-1);
+    return make_virtual(name, rows, source_dims, source, mappings, native_type<T>(), &missing);
+  }
 
   Object data_set(const std::string& name) const;
   Dims dims() const;  // of a data set
@@ -141,6 +148,9 @@ class Object {
                      const Dims& dims) const;
   std::size_t checked_size(const Dims& expected, std::size_t element) const;
   void read_array(hid_t type, void* values) const;
+  Object make_virtual(const std::string& name, hsize_t rows, const Dims& source_dims,
+                      const std::string& source, const std::vector<Mapping>& mappings, hid_t type,
+                      const void* missing) const;
 
   Id id_;
   std::shared_ptr<const std::filesystem::path> file_;

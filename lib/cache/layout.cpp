@@ -28,16 +28,17 @@ h5::Object write_floats(const h5::Object& root, const std::string& name, std::sp
   return root.write_deflated(name, values, dims);
 }
 
-void write_positions(const h5::Object& root, const std::vector<float>& position, const Storage& storage) {
+// Into `parent`/position.
+void write_positions(const h5::Object& parent, const std::vector<float>& position, const Storage& storage) {
   const h5::Dims dims = {position.size() / 3, 3};
   if (storage.compression != Compression::kQuantised) {
-    write_floats(root, "position", position, dims, storage.compression);
+    write_floats(parent, "position", position, dims, storage.compression);
     return;
   }
   std::vector<float> rounded = position;
   const double step = quantisation_step(storage.error);
   quantise(rounded, step);
-  const h5::Object set = write_floats(root, "position", rounded, dims, storage.compression);
+  const h5::Object set = write_floats(parent, "position", rounded, dims, storage.compression);
   set.set("error_bound", storage.error);
   set.set("step", step);
 }
@@ -71,6 +72,40 @@ std::vector<state::Surface> read_surface_topology(const h5::Object& root) {
     surfaces.push_back({surface.text("name"), surface.read<std::int32_t>("triangles", {h5::kAny, 3})});
   }
   return surfaces;
+}
+
+// First particle of each guide among those of guides alone.
+std::vector<std::int64_t> guide_offsets(const state::RunHeader& header) {
+  std::vector<std::int64_t> offsets = {0};
+  for (const std::int32_t strand : header.interpolation.guides)
+    offsets.push_back(offsets.back() + header.offsets[strand + 1] - header.offsets[strand]);
+  return offsets;
+}
+
+void write_interpolation(const h5::Object& root, const state::RunHeader& header) {
+  const state::Interpolation& from = header.interpolation;
+  const auto neighbours = static_cast<hsize_t>(from.neighbours);
+  const h5::Object group = root.create_group("interpolation");
+  group.write("guides", view(from.guides), {from.guides.size()});
+  group.write("guide", view(from.guide), {from.guide.size() / neighbours, neighbours});
+  group.write("weight", view(from.weight), {from.weight.size() / neighbours, neighbours});
+  if (!from.guides_apart) return;
+  const std::vector<std::int64_t> offsets = guide_offsets(header);
+  root.create_group("guides").write("offsets", view(offsets), {offsets.size()});
+}
+
+state::Interpolation read_interpolation(const h5::Object& root, hsize_t strands) {
+  const h5::Object group = root.group("interpolation");
+  state::Interpolation to;
+  to.guides = group.read<std::int32_t>("guides", {h5::kAny});
+  to.guide = group.read<std::int32_t>("guide", {strands, h5::kAny});
+  to.weight = group.read<float>("weight", group.data_set("guide").dims());
+  to.neighbours = static_cast<std::int32_t>(group.data_set("guide").dims().at(1));
+  to.guides_apart = root.has("guides");
+  for (const std::int32_t strand : to.guides)
+    if (strand < 0 || static_cast<hsize_t>(strand) >= strands)
+      root.fail("interpolation/guides names strand " + std::to_string(strand) + ", which does not exist");
+  return to;
 }
 
 void check_offsets(const h5::Object& root, const std::vector<std::int64_t>& offsets, std::size_t particles) {
@@ -128,7 +163,13 @@ const char* to_string(Content content) {
 }
 
 FrameRecord record_of(const state::Frame& frame) {
-  FrameRecord record{frame.time, frame.figures, !frame.velocity.empty(), !frame.elongation.empty(), {}};
+  FrameRecord record{frame.time,
+                     frame.figures,
+                     !frame.velocity.empty(),
+                     !frame.elongation.empty(),
+                     !frame.living.empty(),
+                     frame.guide_position.size() / 3,
+                     {}};
   for (const auto& vertices : frame.surface_vertices) record.vertices.push_back(vertices.size() / 3);
   return record;
 }
@@ -183,6 +224,7 @@ void write_header(const h5::Object& root, const state::RunHeader& header) {
   strands.write("width", view(header.width), {particles});
   strands.write("groom", view(header.groom_of_strand), {strand_count});
   strands.write_strings("groom_names", header.groom_names);
+  if (!header.interpolation.guides.empty()) write_interpolation(root, header);
   write_surface_topology(root, header.surfaces);
 }
 
@@ -213,6 +255,7 @@ state::RunHeader read_header(const h5::Object& root) {
   header.width = strands.read<float>("width", {particles});
   header.groom_of_strand = strands.read<std::int32_t>("groom", {strand_count});
   header.groom_names = strands.read_strings("groom_names");
+  if (root.has("interpolation")) header.interpolation = read_interpolation(root, strand_count);
   header.surfaces = read_surface_topology(root);
   return header;
 }
@@ -241,6 +284,9 @@ void write_frame(const h5::Object& root, const state::Frame& frame, const Storag
     write_floats(root, "velocity", frame.velocity, {frame.velocity.size() / 3, 3}, storage.compression);
   if (!frame.elongation.empty())
     write_floats(root, "elongation", frame.elongation, {frame.elongation.size()}, storage.compression);
+  if (!frame.living.empty()) root.write("living", view(frame.living), {frame.living.size()});
+  if (!frame.guide_position.empty())
+    write_positions(root.create_group("guides"), frame.guide_position, storage);
   write_figures(root, frame.figures);
   if (frame.surface_vertices.empty()) return;
   const h5::Object surfaces = root.create_group("surfaces");
@@ -259,6 +305,9 @@ state::Frame read_frame(const h5::Object& root, const state::RunHeader* header) 
   frame.position = root.read<float>("position", {particles, 3});
   if (root.has("velocity")) frame.velocity = root.read<float>("velocity", {frame.position.size() / 3, 3});
   if (root.has("elongation")) frame.elongation = root.read<float>("elongation", {frame.position.size() / 3});
+  if (root.has("living"))
+    frame.living = root.read<std::int32_t>("living", {header ? header->root_triangle.size() : h5::kAny});
+  if (root.has("guides")) frame.guide_position = root.group("guides").read<float>("position", {h5::kAny, 3});
   frame.figures = read_figures(root);
   if (!root.has("surfaces")) return frame;
   const h5::Object surfaces = root.group("surfaces");
@@ -268,8 +317,14 @@ state::Frame read_frame(const h5::Object& root, const state::RunHeader* header) 
 }
 
 FrameRecord read_record(const h5::Object& root) {
-  FrameRecord record{
-      root.number<double>("time"), read_figures(root), root.has("velocity"), root.has("elongation"), {}};
+  FrameRecord record{root.number<double>("time"),
+                     read_figures(root),
+                     root.has("velocity"),
+                     root.has("elongation"),
+                     root.has("living"),
+                     0,
+                     {}};
+  if (root.has("guides")) record.guide_particles = root.group("guides").data_set("position").dims().at(0);
   if (!root.has("surfaces")) return record;
   const h5::Object surfaces = root.group("surfaces");
   for (const std::string& name : surfaces.children())
@@ -308,7 +363,7 @@ void write_tables(const h5::Object& root, const std::map<int, FrameRecord>& fram
 }
 
 // One virtual data set over those frames that have the data.
-template <class Has>
+template <class T = float, class Has>
 void write_field(const h5::Object& parent, const std::string& name, const std::string& source,
                  const h5::Dims& dims, const std::map<int, FrameRecord>& frames, const Files& files,
                  Has has) {
@@ -318,7 +373,7 @@ void write_field(const h5::Object& parent, const std::string& name, const std::s
     if (has(record)) mappings.push_back({row, files.frame_name(number)});
     ++row;
   }
-  if (!mappings.empty()) parent.write_virtual(name, row, dims, source, mappings);
+  if (!mappings.empty()) parent.write_virtual<T>(name, row, dims, source, mappings);
 }
 
 }  // namespace
@@ -332,6 +387,13 @@ void write_sequence(const h5::Object& root, const std::map<int, FrameRecord>& fr
               [](const FrameRecord& record) { return record.velocity; });
   write_field(root, "elongation", "/elongation", {particles}, frames, files,
               [](const FrameRecord& record) { return record.elongation; });
+  write_field<std::int32_t>(root, "living", "/living", {header.root_triangle.size()}, frames, files,
+                            [](const FrameRecord& record) { return record.living; });
+  if (header.interpolation.guides_apart) {
+    const hsize_t of_guides = guide_offsets(header).back();
+    write_field(root.group("guides"), "position", "/guides/position", {of_guides, 3}, frames, files,
+                [=](const FrameRecord& record) { return record.guide_particles == of_guides; });
+  }
   for (std::size_t i = 0; i < header.surfaces.size(); ++i) {
     const auto has = [i](const FrameRecord& record) { return i < record.vertices.size(); };
     const auto first =
@@ -354,6 +416,8 @@ void write_single(const h5::Object& root, const state::Frame& frame) {
   if (!frame.velocity.empty()) write(root, "velocity", frame.velocity);
   if (!frame.elongation.empty())
     root.write_deflated("elongation", frame.elongation, {1, frame.elongation.size()});
+  if (!frame.living.empty()) root.write("living", view(frame.living), {1, frame.living.size()});
+  if (!frame.guide_position.empty()) write(root.group("guides"), "position", frame.guide_position);
   for (std::size_t i = 0; i < frame.surface_vertices.size(); ++i)
     write(root.group(surface_path(i)), "vertices", frame.surface_vertices[i]);
 }
@@ -366,6 +430,9 @@ state::Frame read_single(const h5::Object& root, const state::RunHeader& header)
   frame.position = root.read<float>("position", shape);
   if (root.has("velocity")) frame.velocity = root.read<float>("velocity", shape);
   if (root.has("elongation")) frame.elongation = root.read<float>("elongation", {1, shape[1]});
+  if (root.has("living")) frame.living = root.read<std::int32_t>("living", {1, header.root_triangle.size()});
+  if (root.has("guides"))
+    frame.guide_position = root.group("guides").read<float>("position", {1, h5::kAny, 3});
   const h5::Object figures = root.group("figures");
   for (const std::string& name : figures.children())
     frame.figures.emplace_back(name, figures.read<double>(name, {1})[0]);

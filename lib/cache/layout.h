@@ -24,7 +24,8 @@ struct Storage {
 struct FrameRecord {
   double time = 0;
   state::Figures figures;
-  bool velocity = false, elongation = false;
+  bool velocity = false, elongation = false, living = false;
+  std::size_t guide_particles = 0;
   std::vector<std::size_t> vertices;  // of each surface
 };
 FrameRecord record_of(const state::Frame& frame);

@@ -35,13 +35,16 @@ struct Item {
 };
 
 std::size_t bytes_of(const state::Frame& frame) {
-  std::size_t floats = frame.position.size() + frame.velocity.size() + frame.elongation.size();
+  std::size_t floats = frame.position.size() + frame.velocity.size() + frame.elongation.size() +
+                       frame.living.size() + frame.guide_position.size();
   for (const auto& vertices : frame.surface_vertices) floats += vertices.size();
   return floats * sizeof(float) + 65536;
 }
 
 std::size_t bytes_of(const state::RunHeader& header) {
-  return header.rest_position.size() * 6 + header.offsets.size() * 32 + header.scene_json.size() + 65536;
+  return header.rest_position.size() * 6 + header.offsets.size() * 32 +
+         header.interpolation.guide.size() * 8 + header.interpolation.guides.size() * 16 +
+         header.scene_json.size() + 65536;
 }
 
 }  // namespace

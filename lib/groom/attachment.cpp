@@ -156,6 +156,19 @@ void Attachment::place(Strands& strands) const {
   }
 }
 
+Attachment Attachment::select(std::span<const unsigned char> marks) const {
+  Attachment chosen;
+  for (std::size_t s = 0; s < sites_.size(); ++s) {
+    if (!marks[s]) continue;
+    chosen.sites_.push_back(sites_[s]);
+    chosen.triangles_.push_back(triangles_[s]);
+    chosen.rest_frame_.push_back(rest_frame_[s]);
+    chosen.rest_point_.push_back(rest_point_[s]);
+    chosen.rest_root_.push_back(rest_root_[s]);
+  }
+  return chosen;
+}
+
 void Attachment::pose(std::span<const Vec3> vertices, std::span<Pose> out) const {
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, sites_.size(), 256), [&](const auto& range) {
     for (std::size_t i = range.begin(); i != range.end(); ++i) {

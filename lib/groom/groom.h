@@ -45,6 +45,9 @@ class Attachment {
   // pose.
   void place(Strands& strands) const;
 
+  // Of the strands that are marked alone.
+  Attachment select(std::span<const unsigned char> marks) const;
+
   const std::vector<RootSite>& sites() const { return sites_; }
 
   // Root poses for the head's vertices now: rotation from the rest pose's triangle frame to now's (exactly

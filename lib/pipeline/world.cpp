@@ -8,6 +8,7 @@
 #include "core/log.h"
 #include "effects/solids/penetration.h"
 #include "groom/closest_triangle.h"
+#include "groom/edit.h"
 #include "kernels/solid/response.h"
 #include "kernels/strand/strand_batch.h"
 
@@ -57,22 +58,6 @@ std::vector<Vec3> root_points(const groom::Strands& strands) {
   return points;
 }
 
-groom::Strands without(const groom::Strands& strands, const std::vector<unsigned char>& prune) {
-  groom::Strands kept;
-  kept.group_names = strands.group_names;
-  for (std::size_t s = 0; s < strands.size(); ++s) {
-    if (prune[s]) continue;
-    const auto begin = strands.offsets[s], end = strands.offsets[s + 1];
-    kept.points.insert(kept.points.end(), strands.points.begin() + begin, strands.points.begin() + end);
-    if (!strands.widths.empty())
-      kept.widths.insert(kept.widths.end(), strands.widths.begin() + begin, strands.widths.begin() + end);
-    if (!strands.roots.empty()) kept.roots.push_back(strands.roots[s]);
-    if (!strands.groups.empty()) kept.groups.push_back(strands.groups[s]);
-    kept.offsets.push_back(static_cast<std::int64_t>(kept.points.size()));
-  }
-  return kept;
-}
-
 std::optional<groom::Attachment> attach(const World& world, const scene::Groom& desc,
                                         groom::Strands& strands) {
   if (desc.attach == scene::Attach::kFixed) return std::nullopt;
@@ -80,6 +65,25 @@ std::optional<groom::Attachment> attach(const World& world, const scene::Groom& 
       groom::Attachment::to_head(strands, scalp_of(*world.head), desc);
   attachment->place(strands);
   return attachment;
+}
+
+// One groom's strands, as they are held.
+struct Held {
+  groom::Strands strands;
+  std::optional<groom::Attachment> attachment;  // empty: fixed
+  std::vector<std::int32_t> skin;               // [strands] as Skin::triangles
+  std::vector<unsigned char> guides;            // [strands] 1: simulated
+
+  std::size_t size() const { return strands.size(); }
+};
+
+// The strands that are marked.
+Held select(const Held& held, const std::vector<unsigned char>& marks) {
+  Held chosen{groom::select(held.strands, marks), std::nullopt, {}, {}};
+  if (held.attachment) chosen.attachment = held.attachment->select(marks);
+  for (std::size_t s = 0; s < marks.size(); ++s)
+    if (marks[s]) chosen.skin.push_back(held.skin[s]), chosen.guides.push_back(held.guides[s]);
+  return chosen;
 }
 
 // The triangles of the home solid that strands grow on. Its surface begins with the head's triangles; on a
@@ -98,9 +102,12 @@ std::vector<std::int32_t> find_skin(const scene::Scene& scene, const World& worl
 }
 
 // Moves what starts inside the head out of it, in the rest shape; says how much that was.
-void clear_head(const scene::Scene& scene, const scene::Groom& desc, World& world, groom::Strands& strands,
-                std::optional<groom::Attachment>& attachment, std::vector<std::int32_t>& skin) {
-  if (world.skin.home < 0) return;
+void clear_head(const scene::Scene& scene, const scene::Groom& desc, World& world, Held& held) {
+  auto& [strands, attachment, skin, guides] = held;
+  if (world.skin.home < 0) {
+    skin.assign(strands.size(), kernels::kNoSkin);
+    return;
+  }
   skin = find_skin(scene, world, attachment ? &*attachment : nullptr, strands);
 
   const std::vector<Vec3> rest = root_points(strands);
@@ -133,15 +140,11 @@ void clear_head(const scene::Scene& scene, const scene::Groom& desc, World& worl
                     "collide with it",
                     desc.name, report.buried));
   if (std::find(prune.begin(), prune.end(), 1) == prune.end()) return;
-  strands = without(strands, prune);
-  std::vector<std::int32_t> kept;
-  for (std::size_t s = 0; s < prune.size(); ++s)
-    if (!prune[s]) kept.push_back(skin[s]);
-  skin = std::move(kept);
+  for (unsigned char& mark : prune) mark = !mark;
+  held = select(held, prune);
   if (strands.size() == 0)
     throw Error(ErrorKind::kInput, desc.pointer, "every strand starts inside the head and was pruned",
                 "use \"penetration\": \"push_out\", or check units and up axis");
-  attachment = attach(world, desc, strands);
 }
 
 double sample_curve(const scene::Curve& curve, double x) {
@@ -156,21 +159,23 @@ double sample_curve(const scene::Curve& curve, double x) {
 }
 
 // The model's stiffness along each strand, scaled root to tip by the groom's curves.
+// `counts`: the strands' particles at the start; where there is room for more, these have the tip's.
 void append_stiffness(const scene::Scene& scene, const scene::Groom& desc, const groom::Strands& strands,
-                      std::vector<float>& out) {
+                      std::span<const std::int32_t> counts, std::vector<float>& out) {
   static const char* const kNames[kernels::kCouplings] = {"edge", "bend", "twist", "integrity", "angular"};
   const scene::Stiffness& base = scene.model.stiffness;
   const double values[kernels::kCouplings] = {base.edge, base.bend, base.twist, base.integrity, base.angular};
   for (std::size_t s = 0; s < strands.size(); ++s) {
-    const int n = strands.count(s);
-    for (int i = 0; i < n; ++i) {
+    const double last = counts[s] - 1;
+    for (int i = 0; i < strands.count(s); ++i) {
+      const double position = last > 0 ? std::min(i / last, 1.0) : 0;
       for (int c = 0; c < kernels::kCouplings; ++c) {
         double value = values[c];
         for (const scene::StiffnessScale& scale : desc.stiffness) {
           const bool group = scale.group.empty() || (!strands.groups.empty() &&
                                                      strands.group_names[strands.groups[s]] == scale.group);
           if (group && (scale.coupling == "all" || scale.coupling == kNames[c]))
-            value *= sample_curve(scale.curve, n > 1 ? i / (n - 1.0) : 0.0);
+            value *= sample_curve(scale.curve, position);
         }
         out.push_back(static_cast<float>(value));
       }
@@ -178,36 +183,82 @@ void append_stiffness(const scene::Scene& scene, const scene::Groom& desc, const
   }
 }
 
-void append(const groom::Strands& from, std::int32_t groom, World& world) {
-  groom::Strands& to = world.strands;
-  const std::int64_t base = to.offsets.back();
+void append(const Held& held, std::int32_t groom, const scene::Groom& desc, StrandSet& to) {
+  const groom::Strands& from = held.strands;
+  const std::int64_t base = to.strands.offsets.back();
   for (std::size_t s = 0; s < from.size(); ++s) {
-    to.offsets.push_back(base + from.offsets[s + 1]);
-    world.groom_of_strand.push_back(groom);
+    to.strands.offsets.push_back(base + from.offsets[s + 1]);
+    to.groom_of_strand.push_back(groom);
   }
-  to.points.insert(to.points.end(), from.points.begin(), from.points.end());
-  to.widths.insert(to.widths.end(), from.widths.begin(), from.widths.end());
+  to.strands.points.insert(to.strands.points.end(), from.points.begin(), from.points.end());
+  to.strands.widths.insert(to.strands.widths.end(), from.widths.begin(), from.widths.end());
+  if (held.attachment) {
+    const auto& sites = held.attachment->sites();
+    to.sites.insert(to.sites.end(), sites.begin(), sites.end());
+    to.roots->add_attached(*held.attachment, root_points(from));
+  } else {
+    to.sites.resize(to.sites.size() + from.size());
+    to.roots->add_fixed(desc.animation, root_points(from));
+  }
+}
+
+// Room at the tips for what grooming may add, filled with the tip itself.
+groom::Strands with_room(const scene::Scene& scene, const scene::Groom& desc, const groom::Strands& strands) {
+  std::vector<scene::GroomingOperation> operations;
+  for (const scene::GroomingOperation& operation : scene.effects.grooming)
+    if (operation.groom.empty() || operation.groom == desc.name) operations.push_back(operation);
+  groom::Strands roomy;
+  roomy.groups = strands.groups, roomy.group_names = strands.group_names;
+  for (std::size_t s = 0; s < strands.size(); ++s) {
+    const std::size_t first = strands.offsets[s], count = strands.count(s);
+    const std::size_t room =
+        std::max(count, groom::most_particles(std::span(strands.points).subspan(first, count), operations));
+    for (std::size_t i = 0; i < room; ++i) {
+      roomy.points.push_back(strands.points[first + std::min(i, count - 1)]);
+      roomy.widths.push_back(strands.widths[first + std::min(i, count - 1)]);
+    }
+    roomy.offsets.push_back(static_cast<std::int64_t>(roomy.points.size()));
+  }
+  return roomy;
 }
 
 void build_groom(const scene::Scene& scene, std::size_t index, bool scales_stiffness, World& world) {
   const scene::Groom& desc = scene.grooms[index];
   const std::optional<groom::Scalp> scalp =
       world.head ? std::optional<groom::Scalp>(scalp_of(*world.head)) : std::nullopt;
-  groom::Strands strands = groom::build(desc, scene.units, scalp ? &*scalp : nullptr);
+  Held held{groom::build(desc, scene.units, scalp ? &*scalp : nullptr), std::nullopt, {}, {}};
+  groom::Strands& strands = held.strands;
   if (strands.widths.empty()) strands.widths.assign(strands.points.size(), static_cast<float>(desc.width));
-  std::optional<groom::Attachment> attachment = attach(world, desc, strands);
-  std::vector<std::int32_t> skin;
-  clear_head(scene, desc, world, strands, attachment, skin);
-  world.skin.triangles.insert(world.skin.triangles.end(), skin.begin(), skin.end());
-  if (scales_stiffness) append_stiffness(scene, desc, strands, world.stiffness);
-  append(strands, static_cast<std::int32_t>(index), world);
-  if (attachment) {
-    world.sites.insert(world.sites.end(), attachment->sites().begin(), attachment->sites().end());
-    world.roots->add_attached(std::move(*attachment), root_points(strands));
-  } else {
-    world.sites.resize(world.sites.size() + strands.size());
-    world.roots->add_fixed(desc.animation, root_points(strands));
+  held.guides.assign(strands.size(), 1);
+  if (desc.interpolate) held.guides = groom::choose_guides(strands, *desc.interpolate);
+  held.attachment = attach(world, desc, strands);
+  clear_head(scene, desc, world, held);
+  const auto groom = static_cast<std::int32_t>(index);
+  if (world.interpolated) {
+    append(held, groom, desc, world.interpolated->all);
+    world.interpolated->interpolation.add(strands, held.guides,
+                                          desc.interpolate ? desc.interpolate->neighbours : 1);
   }
+  if (desc.interpolate) held = select(held, held.guides);
+  if (strands.size() == 0)
+    throw Error(ErrorKind::kInput, desc.interpolate->pointer,
+                "every guide starts inside the head and was pruned",
+                "choose other guides, or use \"penetration\": \"push_out\"");
+  std::vector<std::int32_t> counts;
+  for (std::size_t s = 0; s < strands.size(); ++s) counts.push_back(strands.count(s));
+  if (!scene.effects.grooming.empty()) strands = with_room(scene, desc, strands);
+  world.living.insert(world.living.end(), counts.begin(), counts.end());
+  world.skin.triangles.insert(world.skin.triangles.end(), held.skin.begin(), held.skin.end());
+  if (scales_stiffness) append_stiffness(scene, desc, strands, counts, world.stiffness);
+  append(held, groom, desc, world.simulated);
+}
+
+// The most guides that a strand follows; 0 where no groom interpolates.
+int most_neighbours(const scene::Scene& scene) {
+  int most = 0;
+  for (const scene::Groom& groom : scene.grooms)
+    if (groom.interpolate) most = std::max(most, groom.interpolate->neighbours);
+  return most;
 }
 
 }  // namespace
@@ -216,7 +267,11 @@ World build_world(const scene::Scene& scene) {
   World world;
   if (scene.head) world.head = std::make_unique<solids::AnimatedMesh>(*scene.head, scene.units, scene.frames);
   build_solids(scene, world);
-  world.roots = std::make_unique<Roots>(world.head.get(), scene.frames);
+  world.simulated.roots = std::make_unique<Roots>(world.head.get(), scene.frames);
+  if (const int neighbours = most_neighbours(scene)) {
+    world.interpolated = std::make_unique<Interpolated>(Interpolated{{}, groom::Interpolation(neighbours)});
+    world.interpolated->all.roots = std::make_unique<Roots>(world.head.get(), scene.frames);
+  }
   const bool scales = std::any_of(scene.grooms.begin(), scene.grooms.end(),
                                   [](const scene::Groom& groom) { return !groom.stiffness.empty(); });
   for (std::size_t k = 0; k < scene.grooms.size(); ++k) build_groom(scene, k, scales, world);

@@ -6,12 +6,28 @@
 
 #include "effects/solids/contact_stage.h"
 #include "groom/groom.h"
+#include "groom/interpolation.h"
 #include "pipeline/roots.h"
 #include "scene/scene_desc.h"
 #include "solids/mesh.h"
 #include "solids/solid.h"
 
 namespace ringlet::pipeline {
+
+// Strands of all grooms, one groom after the other: their rest shapes, penetration resolved, and how they are
+// held.
+struct StrandSet {
+  groom::Strands strands;
+  std::vector<groom::RootSite> sites;  // [strands]; triangle -1 without a head
+  std::vector<std::int32_t> groom_of_strand;
+  std::unique_ptr<Roots> roots;
+};
+
+// All strands of a scene that interpolates.
+struct Interpolated {
+  StrandSet all;
+  groom::Interpolation interpolation;
+};
 
 struct World {
   std::unique_ptr<solids::AnimatedMesh> head;     // null: none
@@ -20,13 +36,15 @@ struct World {
       shown;  // head first, then the other solids, as the scene shows them
   std::vector<std::string> shown_names;
   std::vector<solids::Solid> solids;
-  groom::Strands strands;              // all grooms, one after the other; rest shape, penetration resolved
-  std::vector<groom::RootSite> sites;  // [strands]; triangle -1 without a head
-  std::vector<std::int32_t> groom_of_strand;
-  std::vector<float> stiffness;  // [particles * kCouplings] where a groom scales it, else empty
-  std::unique_ptr<Roots> roots;
+  StrandSet simulated;               // guides alone, where a groom interpolates
+  std::vector<std::int32_t> living;  // [strands] particles at the start; where grooming may lengthen a
+                                     // strand, there is room for that at its tip
+  std::vector<float> stiffness;      // [particles * kCouplings] where a groom scales it, else empty
+  std::unique_ptr<Interpolated> interpolated;       // null where no groom does
   const solids::AnimatedMesh* home_mesh = nullptr;  // what collides as the head
   effects::Skin skin;                               // what they grow on among the solids
+
+  const groom::Interpolation& interpolation() const { return interpolated->interpolation; }
 };
 
 // Reads and builds all assets. Throws Error{kInput}.

@@ -236,7 +236,7 @@ struct Sphere {
 
 // Cuts every strand where it first enters what is cut away, counted from its root. One of these is set.
 struct Trim {
-  std::optional<Plane> plane;              // inside: the side that the normal does not point to
+  std::optional<Plane> plane;              // the half space behind it, which its normal points out of
   std::optional<std::array<Vec3, 2>> box;  // [m] lower and upper corner
   std::optional<Sphere> sphere;
   std::optional<MeshDesc> mesh;  // closed

@@ -14,6 +14,15 @@ struct Surface {
   std::vector<std::int32_t> triangles;  // [triangles * 3]
 };
 
+// How strands follow those that were simulated (groom/interpolation.h). `guides` empty: all strands were.
+struct Interpolation {
+  std::int32_t neighbours = 0;
+  std::vector<std::int32_t> guides;  // [guides] the strands that were simulated, ascending
+  std::vector<std::int32_t> guide;   // [strands * neighbours] index into `guides`, -1: none
+  std::vector<float> weight;         // [strands * neighbours]
+  bool guides_apart = false;         // frames hold the guides' positions by themselves as well
+};
+
 // Constant over a run. Strand and particle order are the grooms', in the order the scene lists them.
 struct RunHeader {
   std::string name;        // the scene's
@@ -35,6 +44,7 @@ struct RunHeader {
   std::vector<float> width;                 // [particles] diameter, scene units
   std::vector<std::int32_t> groom_of_strand;
   std::vector<std::string> groom_names;
+  Interpolation interpolation;
   std::vector<Surface> surfaces;  // where the cache's fields name `solids`
 };
 
@@ -43,10 +53,12 @@ using Figures = std::vector<std::pair<std::string, double>>;
 
 struct Frame {
   int number = 0;
-  double time = 0;                // [s] after the first frame
-  std::vector<float> position;    // [particles * 3] scene units
-  std::vector<float> velocity;    // [particles * 3] scene units per second; empty: not asked for
-  std::vector<float> elongation;  // [particles] that non-Hookean integrity remembers; empty: not asked for
+  double time = 0;                   // [s] after the first frame
+  std::vector<float> position;       // [particles * 3] scene units
+  std::vector<float> velocity;       // [particles * 3] scene units per second; empty: not asked for
+  std::vector<float> elongation;     // [particles] that non-Hookean integrity remembers; empty: not asked for
+  std::vector<std::int32_t> living;  // [strands] particles that grooming has left; empty: all
+  std::vector<float> guide_position;  // [guides' particles * 3] as position; empty: not asked for
   std::vector<std::vector<float>> surface_vertices;  // as RunHeader::surfaces, [vertices * 3]
   Figures figures;
 };

@@ -35,37 +35,59 @@ StrandModel<T>::StrandModel(const StrandInput& input)
       per_length(input.elongation ? layout.batches() * kLanes : 0, T(0)) {
   std::size_t first = 0;
   for (std::size_t strand = 0; strand < input.counts.size(); ++strand) {
-    const int n = input.counts[strand];
-    count[layout.at_strand(strand, 1, 0)] = static_cast<T>(n);
-    for (int i = 0; i < n; ++i) {
-      const Vec3 relative = input.rest[first + i] - input.rest[first];
-      for (int c = 0; c < 3; ++c) rest[layout.at(strand, i, 3, c)] = static_cast<T>(relative[c]);
-      for (int k = 0; k < kCouplings && !stiffness.empty(); ++k)
+    const int n = input.living.empty() ? input.counts[strand] : input.living[strand];
+    const auto points = std::span(input.rest).subspan(first, n);
+    std::vector<Vec3> shape;
+    for (const Vec3& point : points) shape.push_back(point - points[0]);
+    set_shape(strand, shape);
+    for (int i = 0; i < input.counts[strand] && !stiffness.empty(); ++i)
+      for (int k = 0; k < kCouplings; ++k)
         stiffness[layout.at(strand, i, kCouplings, k)] =
             static_cast<T>(input.stiffness[(first + i) * kCouplings + k]);
-    }
-    // By the very operations of the step's springs, so that the rest shape carries no force at all.
-    for (int i = 0; i < n; ++i)
-      for (int a = 0; a < 3 && i + 1 + a < n; ++a)
-        rest_length[layout.at(strand, i, 3, a)] =
-            kernels::length(get(rest, layout, strand, i + 1 + a) - get(rest, layout, strand, i));
     if (input.companions) {
-      const std::vector<Vec3> companions = rest_companions(std::span(input.rest).subspan(first, n));
+      const std::vector<Vec3> companions = rest_companions(points);
       for (int i = 0; i + 1 < n; ++i)
         for (int c = 0; c < 3; ++c)
           rest_companion[layout.at(strand, i, 3, c)] = static_cast<T>(companions[i][c]);
     }
-    if (input.elongation) {
-      double length = 0;
-      for (int i = 0; i + 1 < n; ++i) length += (input.rest[first + i + 1] - input.rest[first + i]).norm();
-      per_length[layout.at_strand(strand, 1, 0)] = static_cast<T>(length > 0 ? 1 / length : 0);
-    }
-    if (input.preload) {
-      const Vec3 against = -(input.first_rotation[strand].transpose() * *input.preload);
-      for (int c = 0; c < 3; ++c) preload[layout.at_strand(strand, 3, c)] = static_cast<T>(against[c]);
-    }
-    first += n;
+    if (input.preload) set_preload(strand, *input.preload, input.first_rotation[strand]);
+    first += input.counts[strand];
   }
+}
+
+template <class T>
+std::vector<Vec3> StrandModel<T>::shape(std::size_t strand) const {
+  std::vector<Vec3> shape;
+  for (int i = 0; i < living(strand); ++i) {
+    const V<T> at = get(rest, layout, strand, i);
+    shape.emplace_back(at.x, at.y, at.z);
+  }
+  return shape;
+}
+
+template <class T>
+void StrandModel<T>::set_shape(std::size_t strand, std::span<const Vec3> shape) {
+  const int n = static_cast<int>(shape.size()), room = layout.count(strand);
+  count[layout.at_strand(strand, 1, 0)] = static_cast<T>(n);
+  double length = 0;
+  for (int i = 0; i < room; ++i) {
+    for (int c = 0; c < 3; ++c) rest[layout.at(strand, i, 3, c)] = i < n ? static_cast<T>(shape[i][c]) : T(0);
+    if (i > 0 && i < n) length += (shape[i] - shape[i - 1]).norm();
+  }
+  // By the very operations of the step's springs, so that the rest shape carries no force at all.
+  for (int i = 0; i < room; ++i)
+    for (int a = 0; a < 3; ++a)
+      rest_length[layout.at(strand, i, 3, a)] =
+          i + 1 + a < n ? kernels::length(get(rest, layout, strand, i + 1 + a) - get(rest, layout, strand, i))
+                        : T(0);
+  if (!per_length.empty())
+    per_length[layout.at_strand(strand, 1, 0)] = static_cast<T>(length > 0 ? 1 / length : 0);
+}
+
+template <class T>
+void StrandModel<T>::set_preload(std::size_t strand, const Vec3& gravity, const Mat3& rotation) {
+  const Vec3 against = -(rotation.transpose() * gravity);
+  for (int c = 0; c < 3; ++c) preload[layout.at_strand(strand, 3, c)] = static_cast<T>(against[c]);
 }
 
 template <class T>

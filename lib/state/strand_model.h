@@ -16,9 +16,11 @@ using AlignedVector = std::vector<T, tbb::cache_aligned_allocator<T>>;
 
 // What a model is made of, strand after strand in file order.
 struct StrandInput {
-  std::vector<std::int32_t> counts;  // [strands] particles
-  std::vector<Vec3> rest;            // [particles] rest shape, world axes at rest [m]
-  std::vector<float> stiffness;      // [particles * kCouplings] [1/s^2], empty: uniform
+  std::vector<std::int32_t> counts;  // [strands] particles there is room for
+  std::vector<std::int32_t>
+      living;                    // [strands] particles there are, at least 1; empty: as many as there is room
+  std::vector<Vec3> rest;        // [particles] rest shape, world axes at rest [m]
+  std::vector<float> stiffness;  // [particles * kCouplings] [1/s^2], empty: uniform
   std::vector<Mat3> first_rotation;  // [strands] root rotation at the first frame; for the preload
   std::optional<Vec3> preload;       // gravity to preload against [m/s^2]; empty: no preload
   bool companions = false;           // the mass-spring model's
@@ -34,6 +36,14 @@ struct StrandModel {
   explicit StrandModel(const StrandInput& input);
   kernels::StrandBatches<T> view() const;
   std::size_t bytes() const;
+
+  // A strand's particles; what it has room for beyond them is inert.
+  int living(std::size_t strand) const { return static_cast<int>(count[layout.at_strand(strand, 1, 0)]); }
+  // A strand's rest shape, relative to its root in the rest pose's axes [m].
+  std::vector<Vec3> shape(std::size_t strand) const;
+  // Gives a strand this rest shape, relative to its root in the rest pose's axes [m].
+  void set_shape(std::size_t strand, std::span<const Vec3> shape);
+  void set_preload(std::size_t strand, const Vec3& gravity, const Mat3& rotation);
 };
 
 template <class T>

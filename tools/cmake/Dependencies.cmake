@@ -7,6 +7,7 @@ find_package(fmt REQUIRED)
 find_package(spdlog REQUIRED)
 find_package(CLI11 REQUIRED)
 find_package(assimp 5.2 REQUIRED)
+find_package(nanoflann 1.4 REQUIRED)
 
 set(HDF5_PREFER_PARALLEL FALSE)
 set(HDF5_USE_STATIC_LIBRARIES ON)  # the shared one drags in some thirty libraries (tools/bundle)

@@ -162,6 +162,13 @@ class Run:
     def position(self, frame):
         return self.field("position", frame)
 
+    def living(self, frame):
+        """[particles] whether a particle is still on its strand: trimming cuts strands off at their tips."""
+        with h5py.File(self.directory / f"{self.scene_name}.{frame:04d}.h5") as file:
+            living = file["living"][:] if "living" in file else self.counts
+        index = np.arange(len(self.cache.rest_position)) - np.repeat(self.roots, self.counts)
+        return index < np.repeat(living, self.counts)
+
     def surfaces(self, frame):
         """[(vertices, triangles)] where cache.fields has `solids`."""
         return self.cache.frame(frame).surfaces
@@ -224,13 +231,15 @@ class Run:
         """[particles] Needs `velocity` in cache.fields."""
         return np.linalg.norm(self.field("velocity", frame), axis=1)
 
-    def inside(self, frame, depth=0.0):
-        """[particles] whether a particle, roots excepted, is more than `depth` inside a solid, counted by crossings and
-        not by the simulator's level sets. Needs `solids` in cache.fields."""
+    def inside(self, frame, depth=0.0, solid=None):
+        """[particles] whether a particle, roots excepted, is more than `depth` inside a solid (or number `solid` alone),
+        counted by crossings and not by the simulator's level sets. Needs `solids` in cache.fields."""
         from .inside import inside_solids
 
-        found = inside_solids(self.position(frame), self.surfaces(frame), depth)
+        surfaces = self.surfaces(frame)
+        found = inside_solids(self.position(frame), surfaces if solid is None else surfaces[solid : solid + 1], depth)
         found[self.roots] = False
+        found &= self.living(frame)
         return found
 
     def health(self, frames=None, depth=1e-4):

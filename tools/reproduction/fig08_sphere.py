@@ -5,7 +5,7 @@ from . import pictures
 
 FRAMES = [1, 16, 26, 44, 54, 90]
 VIEW = (15, 30)
-INNER = 0.102  # radius of the inner wall [m], as tools/make-paper-assets makes it
+INNER, OUTER = 0.102, 0.11  # radii of the walls [m], as tools/make-paper-assets makes them
 
 
 def make(figures):
@@ -31,10 +31,13 @@ def sphere(run, frame):
 
 
 def caught(run, frame):
-    """Particles in the hollow: nearer to the centre than the inner wall. The poles of both walls, the last two vertices
-    of the mesh, are on the axis on the far side of the opening: the centre is a radius before them."""
-    vertices = sphere(run, frame)[0]
-    outer, inner = vertices[-2].astype(float), vertices[-1].astype(float)
-    inwards = (inner - outer) / np.linalg.norm(inner - outer)
-    centre = inner + INNER * inwards
-    return int((np.linalg.norm(run.position(frame) - centre, axis=1) < INNER).sum())
+    """Particles in the hollow."""
+    return int((from_centre(run, frame) < INNER).sum())
+
+
+def from_centre(run, frame):
+    """[particles] distance from the sphere's centre. The last two vertices of its mesh are the poles of the outer and of
+    the inner wall, on the axis on the far side of the opening: the centre is a radius before them."""
+    outer, inner = sphere(run, frame)[0][-2:].astype(float)
+    centre = inner + INNER * (inner - outer) / np.linalg.norm(inner - outer)
+    return np.linalg.norm(run.position(frame) - centre, axis=1)

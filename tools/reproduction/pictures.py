@@ -15,19 +15,21 @@ VIEWS = {"front": (0, 5), "side": (90, 5), "back": (180, 10), "three-quarter": (
 
 
 def render(run, frame, camera=None, view="three-quarter", size=(320, 320), samples=16, colour="brown", strands=None,
-           position=None):
+           position=None, living=None):
     """A picture of a frame. `camera` of shared_camera() for pictures that are to be compared; `strands`: indices of those
-    to draw; `position`: drawn in place of the frame's."""
+    to draw; `position` and `living`, a mask of particles: drawn in place of the frame's."""
     import studio
 
     camera = camera or shared_camera([(run, frame)], view, size)
     position = run.position(frame) if position is None else position
-    keep = np.zeros(len(run.roots), bool)
-    keep[slice(None) if strands is None else strands] = True
-    strand = np.repeat(np.arange(len(run.counts)), run.counts)
-    keep[strand[~np.isfinite(position).all(1)]] = False
-    particles = keep[strand]
-    offsets = np.concatenate([[0], np.cumsum(run.counts[keep])])
+    particles = run.living(frame) if living is None else living.copy()
+    chosen = np.zeros(len(run.roots), bool)
+    chosen[slice(None) if strands is None else strands] = True
+    bad = np.add.reduceat((~np.isfinite(position).all(1) & particles).astype(int), run.roots) > 0
+    left = np.add.reduceat(particles.astype(int), run.roots)
+    particles &= np.repeat(chosen & ~bad & (left >= 2), run.counts)
+    left = np.add.reduceat(particles.astype(int), run.roots)
+    offsets = np.concatenate([[0], np.cumsum(left[left > 0])])
     width = np.maximum(run.cache.width.astype(float), studio.THINNEST * camera.pixel)
     pixels = studio.picture(
         position[particles], width[particles], offsets, run.surfaces(frame), camera, samples, colour
@@ -47,7 +49,7 @@ def shared_camera(runs_and_frames, view="three-quarter", size=(320, 320), surfac
     import studio
 
     if points is None:
-        hair = np.concatenate([run.position(frame) for run, frame in runs_and_frames])
+        hair = np.concatenate([run.position(frame)[run.living(frame)] for run, frame in runs_and_frames])
         hair = hair[np.isfinite(hair).all(1)]
         reach = 0.2 * np.linalg.norm(hair.max(0) - hair.min(0))
         low, high = hair.min(0) - reach, hair.max(0) + reach

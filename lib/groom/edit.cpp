@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "core/log.h"
+#include "groom/assemble.h"
 #include "groom/edit_operations.h"
 
 namespace ringlet::groom {
@@ -50,37 +51,15 @@ bool edit(EditedStrand& strand, const scene::GroomingOperation& operation, const
 
 // ---- Whole grooms ------------------------------------------------------------------------------------
 
-struct FileStrand {
-  EditedStrand strand;
-  std::vector<float> widths;
-};
-
-FileStrand take(const Strands& strands, std::size_t number) {
-  const auto first = strands.offsets[number], end = strands.offsets[number + 1];
-  FileStrand one;
-  one.strand.rest.assign(strands.points.begin() + first, strands.points.begin() + end);
-  one.strand.position = one.strand.rest;
-  one.strand.velocity.assign(one.strand.rest.size(), Vec3::Zero());
-  one.strand.rotation = Mat3::Identity();
-  if (!strands.widths.empty())
-    one.widths.assign(strands.widths.begin() + first, strands.widths.begin() + end);
-  return one;
-}
-
-// `edited` in place of the old strands, but for those cut down to their root.
-Strands gather(const Strands& old, const std::vector<FileStrand>& edited) {
-  Strands all;
-  all.group_names = old.group_names;
-  for (std::size_t s = 0; s < edited.size(); ++s) {
-    const std::vector<Vec3>& points = edited[s].strand.rest;
-    if (points.size() == 1 && old.count(s) > 1) continue;
-    all.points.insert(all.points.end(), points.begin(), points.end());
-    all.widths.insert(all.widths.end(), edited[s].widths.begin(), edited[s].widths.end());
-    all.offsets.push_back(static_cast<std::int64_t>(all.points.size()));
-    if (!old.groups.empty()) all.groups.push_back(old.groups[s]);
-    if (!old.roots.empty()) all.roots.push_back(old.roots[s]);
-  }
-  return all;
+// Does it to a strand of a file; a strand cut down to its root is no point at all.
+bool edit(StrandShape& shape, const scene::GroomingOperation& operation, const SignedDistance& cutter) {
+  const std::size_t particles = shape.points.size();
+  EditedStrand strand{shape.points, shape.points, std::vector<Vec3>(particles, Vec3::Zero()),
+                      Mat3::Identity()};
+  const bool changed = edit(strand, operation, cutter, shape.widths.empty() ? nullptr : &shape.widths);
+  shape.points = std::move(strand.rest);
+  if (shape.points.size() == 1 && particles > 1) shape = {};
+  return changed;
 }
 
 void check_something_is_left(const Strands& strands, std::size_t before, const std::string& pointer) {
@@ -99,14 +78,13 @@ bool edit(EditedStrand& strand, const scene::GroomingOperation& operation, const
 }
 
 void edit(Strands& strands, const scene::GroomingOperation& operation, const SignedDistance& cutter) {
-  std::vector<FileStrand> edited(strands.size());
+  std::vector<StrandShape> shapes(strands.size());
   std::atomic<std::size_t> changed = 0;
-  tbb::parallel_for(std::size_t{0}, strands.size(), [&](std::size_t s) {
-    edited[s] = take(strands, s);
-    changed +=
-        edit(edited[s].strand, operation, cutter, strands.widths.empty() ? nullptr : &edited[s].widths);
+  tbb::parallel_for(std::size_t{0}, shapes.size(), [&](std::size_t s) {
+    shapes[s] = shape_of(strands, s);
+    changed += edit(shapes[s], operation, cutter);
   });
-  Strands all = gather(strands, edited);
+  Strands all = assemble(strands, shapes);
   check_something_is_left(all, strands.size(), operation.pointer);
   log_info(fmt::format("{}: {} of {} strands changed, {} are gone", operation.pointer, changed.load(),
                        strands.size(), strands.size() - all.size()));

@@ -82,6 +82,27 @@ oracle::Strand rounded(oracle::Strand strand) {
   return strand;
 }
 
+// The air's drag on hair over its linear density: across and along a segment, linear [1/s] and quadratic
+// [1/m].
+struct AirLaw {
+  double normal[2], tangential[2];
+
+  // The matrix that multiplies the air's velocity `u` relative to the segment [1/s].
+  oracle::Mat3 of_segment(const oracle::Vec3& segment, const oracle::Vec3& u) const {
+    const oracle::Vec3 t = segment.normalized();
+    const oracle::Mat3 along = t * t.transpose(), across = oracle::Mat3::Identity() - along;
+    return (tangential[0] + tangential[1] * (along * u).norm()) * along +
+           (normal[0] + normal[1] * (across * u).norm()) * across;
+  }
+  template <class T>
+  kernels::Air<T> as() const {
+    return {nullptr,
+            {static_cast<T>(normal[0]), static_cast<T>(normal[1])},
+            {static_cast<T>(tangential[0]), static_cast<T>(tangential[1])}};
+  }
+};
+inline constexpr AirLaw kHairInAir{{46, 9.6}, {22, 0.1}};
+
 enum class Springs { kAms, kMassSpring };
 
 // Strands of unit mass and their state. The options of the first strand (gravity, drag, damping, clamped

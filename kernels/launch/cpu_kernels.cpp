@@ -11,6 +11,9 @@ namespace ringlet::kernels {
 inline namespace RINGLET_ISA {
 namespace {
 
+static_assert(kStepReals <= kMostScratchReals && kMassSpringReals <= kMostScratchReals &&
+              kContactReals <= kMostScratchReals);
+
 template <class R>
 void strand_step(const StrandStep<Scalar<R>>& step, int begin, int end, Scalar<R>* scratch) {
   constexpr int kWidth = Traits<R>::kWidth;

@@ -21,8 +21,9 @@ struct KernelTable {
 
 enum class InstructionSet { kGeneric, kAvx2, kAvx512 };
 
+inline constexpr int kMostScratchReals = 80;  // a particle, enough for every step of every model
 inline std::int64_t scratch_reals(int particles) {
-  return static_cast<std::int64_t>(particles) * kLanes * 80;
+  return static_cast<std::int64_t>(particles) * kLanes * kMostScratchReals;
 }
 
 // The widest set that this processor has.

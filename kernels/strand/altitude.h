@@ -5,7 +5,9 @@
 //   h = n . sum_i w_i x_i,  n the unit normal of the altitude's two ends, w_i the barycentric weights of
 //   their nearest points: positive at one end, negative at the other, sum 0
 //
-// The weights' own change does not move h: the gradient of h to x_i is w_i n, exactly.
+// The weights' own change does not move h: the gradient of h to x_i is w_i n, exactly. Where another altitude
+// becomes the shortest the force jumps to that one's: a strand bent hard under its weight trembles about such
+// a jump.
 #pragma once
 #include "kernels/backend/vector.h"
 

@@ -5,7 +5,8 @@
 // middle of segment i, so that any four nodes in a row make a proper tetrahedron even where the hair is
 // straight. Springs join nodes 1, 2 and 3 apart: `edge` where they hold the hair's segments and its
 // companions to it, `bend` from companion to companion, `twist` three apart and for the altitudes. All of it
-// has half-bandwidth 3 and goes through the same elimination as AMS, over a chain twice as long.
+// has half-bandwidth 3 and goes through the same elimination as AMS, over a chain twice as long. The air
+// drags on a companion as on its segment: it stands for hair too.
 #pragma once
 #include "kernels/strand/altitude.h"
 #include "kernels/strand/strand_step.h"
@@ -47,7 +48,9 @@ struct MassSpring {
   }
 
   RINGLET_KERNEL int last() const { return 2 * s.particles - 1; }  // nodes of the longest lane
-  RINGLET_KERNEL int clamped() const { return 2 * step.parameters.clamped; }
+  // The clamped particles and the companions between them: one is a hinge, two hold the tangent and the turn
+  // about it.
+  RINGLET_KERNEL int clamped() const { return 2 * step.parameters.clamped - 1; }
   RINGLET_KERNEL Mask<R> lives(int node) const { return R(T(node)) < nodes; }
   RINGLET_KERNEL Vector3<R> rest_at(int node) const {
     return load3<R>((node % 2 ? rest_companion : s.rest) + 3 * (node / 2) * kLanes, kLanes);
@@ -67,7 +70,8 @@ struct MassSpring {
     return select(lives(node + span), s.kappa(step.parameters, node / 2, coupling), R(0));
   }
 
-  // The altitude spring of the node at hand and the next three: a rank-one block between all four.
+  // The altitude spring of the node at hand and the next three: a rank-one block between all four, without
+  // the geometric stiffness that springs between two nodes have.
   RINGLET_KERNEL void add_altitude(BandWindow<R>& w, int node, const Vector3<R> (&x)[4],
                                    const Vector3<R> (&rest)[4], R h, R total) const {
     const Altitude<R> a = shortest_altitude(x, rest);
@@ -79,9 +83,14 @@ struct MassSpring {
     w.add_rank_one(total * stiffness, a.normal, a.weight);
   }
 
-  // Drag on the particle at hand by the hair's segments on both sides.
-  RINGLET_KERNEL void add_air(BandWindow<R>& w, int node, const Arrays& from, R h, DragTerms<R>& before,
-                              R& rest_before, Vector3<R> segment) const {
+  // Drag on the node at hand: on a particle by the hair's segments on both sides, on a companion by its own.
+  // `segment` begins at the particle.
+  RINGLET_KERNEL void add_air(BandWindow<R>& w, int node, const Arrays& from, R h, Vector3<R> segment,
+                              DragTerms<R>& before, R& rest_before) const {
+    if (node % 2 == 1) {
+      add_drag(w, before, h);
+      return;
+    }
     const int i = node / 2;
     const R rest_after = select(lives(node + 2), s.rest_length_at(i, 0), R(0));
     const Vector3<R> next_velocity = i + 1 < s.particles ? from.hair.velocity_at(i + 1) : zero3<R>();
@@ -120,9 +129,7 @@ struct MassSpring {
         w.couple(a, terms.block);
       }
       add_altitude(w, node, x, rest, h, total);
-      if constexpr (Extra::kAir) {
-        if (node % 2 == 0) add_air(w, node, from, h, drag_before, rest_before, x[2] - x[0]);
-      }
+      if constexpr (Extra::kAir) add_air(w, node, from, h, x[2] - x[0], drag_before, rest_before);
       if (node < clamped()) {
         const Vector3<R> known = select(lives(node), frame.velocity(rest[0]), zero3<R>());
         RINGLET_UNROLL

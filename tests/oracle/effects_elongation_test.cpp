@@ -13,6 +13,12 @@ namespace {
 const scene::Curve kDefault = {{0.5, 0.5}, {0.75, 0.65}, {1.0, 0.7}};
 const scene::Curve kStraight = {{0.002, 0.002}, {0.02, 0.02}, {1e6, 1e6}};
 
+double length_of(const oracle::Strand& strand) {
+  double length = 0;
+  for (int i = 1; i < strand.size(); ++i) length += (strand.rest.col(i) - strand.rest.col(i - 1)).norm();
+  return length;
+}
+
 double secant_of(const scene::Curve& points, double e) {
   return kernels::secant(effects::tension_curve<double>(points), e);
 }
@@ -60,8 +66,9 @@ class KernelElongation : public OnMachine<Machine> {
   // `watch`.
   template <class Watch>
   static oracle::State shake(const scene::Curve* curve, bool permanent, double amplitude, int steps,
-                             const Watch& watch) {
-    const oracle::Strand strand = oracle::helix_strand({});
+                             const Watch& watch, bool paper = false) {
+    oracle::Strand strand = oracle::helix_strand({});
+    if (paper) strand.integrity_tangent = oracle::IntegrityTangent::kPaper;
     StrandRun<Machine> run({strand}, {RootPose{}}, true);
     if (curve) run.soften(effects::tension_curve<T>(*curve), permanent);
     for (int step = 1; step <= steps; ++step) {
@@ -83,12 +90,16 @@ class KernelElongation : public OnMachine<Machine> {
 TYPED_TEST_SUITE(KernelElongation, Machines, MachineNames);
 
 TYPED_TEST(KernelElongation, BelowTheTransitionChangesNoBit) {
-  double most = 0;
-  const auto hookean = this->shake(nullptr, true, 0.02, 240, this->ignore);
-  const auto soft =
-      this->shake(&kDefault, true, 0.02, 240, [&](const auto& run) { most = this->largest(run); });
-  EXPECT_TRUE(most > 0.01 && most < 0.5) << most;
-  EXPECT_TRUE(soft.position == hookean.position && soft.velocity == hookean.velocity);
+  for (const bool paper : {false, true})
+    for (const bool permanent : {false, true}) {
+      double most = 0;
+      const auto hookean = this->shake(nullptr, permanent, 0.02, 240, this->ignore, paper);
+      const auto soft = this->shake(
+          &kDefault, permanent, 0.02, 240,
+          [&](const auto& run) { most = std::max(most, this->largest(run)); }, paper);
+      EXPECT_TRUE(most > 0.01 && most < 0.5) << most;
+      EXPECT_TRUE(soft.position == hookean.position && soft.velocity == hookean.velocity);
+    }
 }
 
 TYPED_TEST(KernelElongation, OnAStraightCurveIsHookean) {
@@ -127,15 +138,44 @@ TYPED_TEST(KernelElongation, PermanentDamageNeverHealsAndReversibleDoes) {
   EXPECT_GT(deviation(damaged), 2 * deviation(healed)) << deviation(damaged) << " " << deviation(healed);
 }
 
+// The preload's ghosts are 98 mm away.
 TYPED_TEST(KernelElongation, ShortStrandsDoNotBreakAtRest) {
-  for (const double size : {0.002, 0.02, 0.2, 2.0}) {  // the preload's ghosts are 98 mm away
+  for (const double length : {0.001, 0.01, 0.03, 0.1, 1.0}) {
     oracle::Strand strand = oracle::helix_strand({});
-    strand.rest *= size;
+    strand.rest *= length / length_of(strand);
     oracle::preload_gravity(strand);
     StrandRun<TypeParam> run({strand}, {RootPose{}}, true);
     run.soften(effects::tension_curve<typename TypeParam::T>(kDefault), true);
-    for (int step = 0; step < 200; ++step) run.step({RootPose{}}, 1.0 / 240);
-    EXPECT_TRUE(this->largest(run) < 1e-3) << size << ": " << this->largest(run);
+    for (int step = 0; step < 240; ++step) run.step({RootPose{}}, 1.0 / 240);
+    EXPECT_TRUE(this->largest(run) < 1e-3) << length << " m: " << this->largest(run);
+  }
+}
+
+// All the way through softening and the break: no eigenvalue of the step's matrix falls below the masses' own
+// 1, as the curve's slope, which is negative at the break, would make it.
+TYPED_TEST(KernelElongation, TheMatrixStaysPositiveDefiniteThroughTheBreak) {
+  for (const bool permanent : {false, true}) {
+    const oracle::Strand strand = oracle::helix_strand({});
+    int hookean = 0, soft = 0, broken = 0, step = 0;
+    oracle::RootPose pose;
+    const auto watch = [&](const StrandRun<TypeParam>& run) {
+      if (++step % 20 != 0) return;
+      oracle::Strand softened = strand;
+      for (int i = 0; i < strand.size(); ++i) {
+        const double share = secant_of(kDefault, run.remembered(0, i));
+        ++(share == 1 ? hookean : share > 0 ? soft : broken);
+        EXPECT_TRUE(share >= 0 && share <= 1) << share;
+        softened.integrity[i] *= share;
+      }
+      const oracle::State state = run.get(0);
+      const oracle::LinearSystem system = assemble(softened, state, {pose, pose, 1.0 / 240});
+      const Eigen::LDLT<Eigen::MatrixXd> pivots(system.matrix);
+      const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(system.matrix, Eigen::EigenvaluesOnly);
+      EXPECT_GE(eigen.eigenvalues().minCoeff(), 1 - 1e-9) << "step " << step;
+      EXPECT_GE(pivots.vectorD().minCoeff(), 1 - 1e-9) << "step " << step;
+    };
+    this->shake(&kDefault, permanent, 0.6, 240, watch);
+    EXPECT_TRUE(hookean > 0 && soft > 0 && broken > 0) << hookean << " " << soft << " " << broken;
   }
 }
 
@@ -143,6 +183,7 @@ TYPED_TEST(KernelElongation, ShortStrandsDoNotBreakAtRest) {
 // is the secant's.
 TYPED_TEST(KernelElongation, SolvesTheReferencesSystemWithTheSecantStiffness) {
   std::mt19937 generator(4);
+  int soft = 0, broken = 0;
   for (int trial = 0; trial < 24; ++trial) {
     oracle::RandomStrand random = oracle::random_strand(generator, 3 + trial % 20, 1);
     random.strand = rounded<typename TypeParam::T>(random.strand);
@@ -153,28 +194,24 @@ TYPED_TEST(KernelElongation, SolvesTheReferencesSystemWithTheSecantStiffness) {
     run.set(0, random.state);
     random.state = run.get(0);
     random.step.h = static_cast<typename TypeParam::T>(random.step.h);
-    const scene::Curve curve = {{0.01, 0.01}, {0.02, 0.015}, {0.05, 0.02}};
+    const scene::Curve curve = {{0.01, 0.01}, {0.02, 0.015}, {0.03, 0.018}};
     run.soften(effects::tension_curve<typename TypeParam::T>(curve), false);
 
-    double length = 0;
-    for (int i = 1; i < random.strand.size(); ++i)
-      length += (random.strand.rest.col(i) - random.strand.rest.col(i - 1)).norm();
+    const double length = length_of(random.strand);
     const oracle::Points y = oracle::ghost(random.strand, random.step.before);
     oracle::Strand softened = random.strand;
-    int soft = 0;
     for (int i = 0; i < softened.size(); ++i) {
-      const double e = (random.state.position.col(i) - y.col(i)).norm() / length;
-      softened.integrity[i] *= secant_of(curve, e);
-      soft += e > 0.01;
+      const double share = secant_of(curve, (random.state.position.col(i) - y.col(i)).norm() / length);
+      softened.integrity[i] *= share;
+      soft += share > 0 && share < 1, broken += share == 0;
     }
-    EXPECT_GT(soft, 0);
     const oracle::LinearSystem system = assemble(softened, random.state, random.step);
-    EXPECT_GT(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(system.matrix).eigenvalues().minCoeff(), 0);
     run.step({random.step.after}, random.step.h);
     const Eigen::VectorXd solution = run.get(0).velocity.rightCols(softened.size() - 1).reshaped();
     const double backward = oracle::backward_error(system, solution);
     EXPECT_TRUE(backward <= this->either(1e-13, 2e-6)) << backward;
   }
+  EXPECT_TRUE(soft > 20 && broken > 20) << soft << " " << broken;
 }
 
 }  // namespace

@@ -8,8 +8,8 @@ constexpr int kCorners[7][4] = {{0, 1, 2, 3}, {1, 2, 3, 0}, {2, 3, 0, 1}, {3, 0,
                                 {0, 1, 2, 3}, {0, 2, 1, 3}, {0, 3, 1, 2}};
 
 double stiffness(const MassSpringChain& chain, int node, int span) {
-  if (span == 3) return chain.twist;
-  return span == 2 && node % 2 == 1 ? chain.bend : chain.edge;
+  if (span == 3) return chain.twist[node / 2];
+  return (span == 2 && node % 2 == 1 ? chain.bend : chain.edge)[node / 2];
 }
 
 double altitude_length(const Points& x, int which) {
@@ -72,7 +72,7 @@ double energy(const MassSpringChain& chain, const Points& x, const std::vector<i
   for (int node = 0; node + 3 < chain.nodes(); ++node) {
     const double now = altitude_length(x.middleCols(node, 4), chosen[node]);
     const double rest = altitude_length(chain.rest.middleCols(node, 4), chosen[node]);
-    sum += 0.5 * chain.twist * (now - rest) * (now - rest);
+    sum += 0.5 * chain.twist[node / 2] * (now - rest) * (now - rest);
   }
   return sum;
 }
@@ -89,7 +89,8 @@ Points force(const MassSpringChain& chain, const Points& x, const std::vector<in
   for (int node = 0; node + 3 < chain.nodes(); ++node) {
     const ReferenceAltitude now = altitude(x.middleCols(node, 4), chosen[node]);
     const double rest = altitude_length(chain.rest.middleCols(node, 4), chosen[node]);
-    for (int k = 0; k < 4; ++k) sum.col(node + k) -= chain.twist * (now.length - rest) * now.gradient[k];
+    for (int k = 0; k < 4; ++k)
+      sum.col(node + k) -= chain.twist[node / 2] * (now.length - rest) * now.gradient[k];
   }
   return sum;
 }
@@ -118,7 +119,7 @@ LinearSystem assemble(const MassSpringChain& chain, const State& state, const St
     for (int i = 0; i < 4; ++i)
       for (int j = 0; j < 4; ++j)
         stiff.block<3, 3>(3 * (node + i), 3 * (node + j)) +=
-            chain.twist * now.gradient[i] * now.gradient[j].transpose();
+            chain.twist[node / 2] * now.gradient[i] * now.gradient[j].transpose();
   }
   if (!chain.geometric_stiffness) geometric.setZero();
   Eigen::MatrixXd matrix = h * (h + chain.damping) * stiff + h * h * geometric;

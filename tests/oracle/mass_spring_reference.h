@@ -10,11 +10,12 @@
 namespace ringlet::oracle {
 
 struct MassSpringChain {
-  Points rest;                                 // [m] nodes at rest in the root's frame, relative to the root
-  double edge = 1e6, bend = 1e6, twist = 1e6;  // [1/s^2]
+  Points rest;  // [m] nodes at rest in the root's frame, relative to the root
+  std::vector<double> edge, bend,
+      twist;  // [1/s^2] of the springs that begin at each particle or its companion
   Vec3 gravity{0, -9.81, 0};
   double drag = 0, damping = 0;  // [1/s], [s]
-  int clamped = 2;               // nodes that follow the root's frame
+  int clamped = 1;               // nodes that follow the root's frame
   bool geometric_stiffness = true;
 
   int nodes() const { return static_cast<int>(rest.cols()); }

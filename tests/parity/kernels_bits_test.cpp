@@ -37,13 +37,14 @@ class KernelBits : public OnMachine<Machine> {
   }
   // The strands listed, run together; their final states.
   template <class On>
-  static std::vector<oracle::State> run(const std::vector<std::size_t>& which, int at_a_time = 0) {
+  static std::vector<oracle::State> run(Springs springs, const std::vector<std::size_t>& which,
+                                        int at_a_time = 0) {
     static const Crowd crowd;
     std::vector<oracle::Strand> strands;
     std::vector<RootPose> poses;
     for (const std::size_t k : which) strands.push_back(crowd.strands[k]), poses.push_back(crowd.before[k]);
     strands[0].drag = 1, strands[0].damping = 1.0 / 60;  // for all
-    StrandRun<On> run(strands, poses, true);
+    StrandRun<On> run(strands, poses, true, springs);
     run.parameters.length_iterations = 3;
     run.soften({1, 0.01, 0.2, {0.01}, {{0.01, 1, -2, 0}}}, true);
     run.blow({3, 1, -2}, {nullptr, {40, 9}, {20, 1}});
@@ -70,22 +71,29 @@ class KernelBits : public OnMachine<Machine> {
 };
 TYPED_TEST_SUITE(KernelBits, Machines, MachineNames);
 
+constexpr Springs kModels[] = {Springs::kAms, Springs::kMassSpring};
+
 TYPED_TEST(KernelBits, DoNotDependOnTheBatchsOtherStrands) {
-  const auto together = this->template run<TypeParam>(this->all());
-  for (std::size_t k = 0; k < together.size(); k += 3)
-    this->expect_same(this->template run<TypeParam>({k}), {together[k]});
+  for (const Springs model : kModels) {
+    const auto together = this->template run<TypeParam>(model, this->all());
+    for (std::size_t k = 0; k < together.size(); k += 3)
+      this->expect_same(this->template run<TypeParam>(model, {k}), {together[k]});
+  }
 }
 
 TYPED_TEST(KernelBits, DoNotDependOnHowBatchesAreShared) {
-  const auto together = this->template run<TypeParam>(this->all());
-  for (const int at_a_time : {1, 2})
-    this->expect_same(this->template run<TypeParam>(this->all(), at_a_time), together);
+  for (const Springs model : kModels) {
+    const auto together = this->template run<TypeParam>(model, this->all());
+    for (const int at_a_time : {1, 2})
+      this->expect_same(this->template run<TypeParam>(model, this->all(), at_a_time), together);
+  }
 }
 
 TYPED_TEST(KernelBits, AreThoseOfTheScalarKernels) {
   if (!TypeParam::kFused) GTEST_SKIP() << TypeParam::name() << " has no fused multiply-add";
-  this->expect_same(this->template run<TypeParam>(this->all()),
-                    this->template run<ScalarMachine<typename TypeParam::T>>(this->all()));
+  for (const Springs model : kModels)
+    this->expect_same(this->template run<TypeParam>(model, this->all()),
+                      this->template run<ScalarMachine<typename TypeParam::T>>(model, this->all()));
 }
 
 }  // namespace

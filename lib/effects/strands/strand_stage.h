@@ -1,4 +1,4 @@
-// The AMS strand step: springs, ghosts, implicit solve, lengths.
+// The strand step of either model: springs, ghosts of AMS, air, implicit solve, lengths.
 #pragma once
 #include <memory>
 

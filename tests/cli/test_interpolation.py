@@ -1,0 +1,158 @@
+"""Guides and interpolated strands through the program: what is stored, what is exact, what is refused."""
+import json
+import subprocess
+
+import h5py
+import numpy as np
+import pytest
+
+from tiny import PARTICLES, STRANDS, frame_bytes, write_scene
+
+COUNT = 40
+
+
+def run(program, scene, out, *options):
+    command = [program, "run", scene, "-o", out, "--progress", "none", *options]
+    return subprocess.run([str(word) for word in command], capture_output=True, text=True)
+
+
+def setting(pointer, value):
+    return ["--set", f"{pointer}={json.dumps(value)}"]
+
+
+def guides(count=COUNT, **more):
+    return setting("/groom/interpolate", {"count": count, **more})
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory):
+    return write_scene(tmp_path_factory.mktemp("interpolation"))
+
+
+@pytest.fixture(scope="module")
+def both(program, scene, tmp_path_factory):
+    out = tmp_path_factory.mktemp("both") / "out"
+    assert run(program, scene, out, *guides(), *setting("/cache/strands", "both")).returncode == 0
+    with h5py.File(out / "tiny.h5") as cache:
+        yield cache
+
+
+def particles_of(cache, strands):
+    offsets = cache["strands/offsets"][:]
+    return np.concatenate([np.arange(offsets[s], offsets[s + 1]) for s in strands])
+
+
+def test_all_strands_are_stored_and_the_guides_once_more_by_themselves(both):
+    assert both["position"].shape[1] == STRANDS * PARTICLES
+    chosen = both["interpolation/guides"][:]
+    assert len(chosen) == COUNT and (np.diff(chosen) > 0).all()
+    assert (np.diff(both["guides/offsets"][:]) == PARTICLES).all()
+    at = particles_of(both, chosen)
+    for now, of_guides in zip(both["position"], both["guides/position"]):
+        np.testing.assert_array_equal(now[at], of_guides)
+
+
+def test_weights_sum_to_1_and_a_guide_follows_itself(both):
+    guide, weight = both["interpolation/guide"][:], both["interpolation/weight"][:]
+    np.testing.assert_allclose(weight.sum(1), 1, atol=2e-7)
+    assert ((guide >= 0) | (weight == 0)).all() and guide.shape == (STRANDS, 3)
+    chosen = both["interpolation/guides"][:]
+    np.testing.assert_array_equal(chosen[guide[chosen, 0]], chosen)
+    assert (weight[chosen, 0] == 1).all()
+    # Nearest first, by the roots.
+    root = both["strands/rest_position"][:][both["strands/offsets"][:-1]]
+    far = np.linalg.norm(root[:, None] - root[chosen][None], axis=-1)
+    others = np.setdiff1d(np.arange(STRANDS), chosen)
+    np.testing.assert_allclose(np.take_along_axis(far, guide, 1)[others], np.sort(far, 1)[others, :3], rtol=1e-6)
+
+
+def test_the_cache_holds_the_strands_that_are_asked_for(program, scene, both, tmp_path):
+    for strands in ("guides", "all"):
+        assert run(program, scene, tmp_path / strands, *guides(), *setting("/cache/strands", strands)).returncode == 0
+    with h5py.File(tmp_path / "guides/tiny.h5") as cache:
+        np.testing.assert_array_equal(cache["position"][:], both["guides/position"][:])
+        assert "interpolation" not in cache and "guides" not in cache
+    with h5py.File(tmp_path / "all/tiny.h5") as cache:
+        np.testing.assert_array_equal(cache["position"][:], both["position"][:])
+        assert "interpolation" in cache and "guides" not in cache
+
+
+def test_guides_move_as_if_they_were_alone(program, scene, both, tmp_path):
+    """What follows a guide does nothing to it: a groom of the guides only gives them the same bits."""
+    only = setting("/groom/interpolate", {"strands": both["interpolation/guides"][:].tolist()})
+    assert run(program, scene, tmp_path / "out", *only, *setting("/cache/strands", "guides")).returncode == 0
+    with h5py.File(tmp_path / "out/tiny.h5") as cache:
+        np.testing.assert_array_equal(cache["position"][:], both["guides/position"][:])
+
+
+def test_a_groom_of_guides_only_is_simulated_whole(program, scene, tmp_path):
+    assert run(program, scene, tmp_path / "plain").returncode == 0
+    assert run(program, scene, tmp_path / "all", *guides(STRANDS)).returncode == 0
+    assert frame_bytes(tmp_path / "all") == frame_bytes(tmp_path / "plain")
+
+
+def test_rigid_motion_is_followed_exactly(program, scene, tmp_path):
+    """The first frame is the rest shape carried by the head, which is turned and moved in it."""
+    turned = setting("/head/animation/keys", [{"frame": 1, "translate": [1, 2, 3], "rotate": [0.3, 0.5, -0.2, 0.7]}])
+    for name, options in (("plain", []), ("guides", guides())):
+        assert run(program, scene, tmp_path / name, *turned, *options, "--frames", "1-1").returncode == 0
+    with h5py.File(tmp_path / "plain/tiny.h5") as plain, h5py.File(tmp_path / "guides/tiny.h5") as followed:
+        np.testing.assert_allclose(followed["position"][0], plain["position"][0], rtol=0, atol=5e-7)
+
+
+def test_roots_stay_on_the_head(program, scene, both, tmp_path):
+    assert run(program, scene, tmp_path / "plain").returncode == 0
+    with h5py.File(tmp_path / "plain/tiny.h5") as plain:
+        root = plain["strands/offsets"][:-1]
+        np.testing.assert_array_equal(both["position"][:, root], plain["position"][:, root])
+
+
+def test_velocities_of_followers_are_those_of_their_positions(program, scene, tmp_path):
+    slow = setting("/frames", {"first": 1, "last": 401, "fps": 4800}) + setting("/model/substeps", 1)
+    fields = setting("/cache/fields", ["position", "velocity"]) + setting("/motion", {"speed": 0.005})
+    options = [*guides(), *slow, *fields, "--frames", "399-401", "--precision", "double"]
+    assert run(program, scene, tmp_path / "out", *options).returncode == 0
+    with h5py.File(tmp_path / "out/tiny.h5") as cache:
+        moved = (cache["position"][2].astype(float) - cache["position"][0]) * 4800 / 2
+        velocity = cache["velocity"][1]
+    size = np.linalg.norm(velocity, axis=1)
+    assert np.median(size) > 0.1
+    # Positions are stored to some 1e-8 m; the rest is the change of velocity from step to step.
+    assert np.percentile(np.linalg.norm(moved - velocity, axis=1), 99) < 0.02 * np.percentile(size, 99)
+
+
+@pytest.mark.parametrize("options", [["--threads", "1"], ["--threads", "2"]])
+def test_threads_and_resuming_change_no_byte(program, scene, both, tmp_path, options):
+    chosen = [*guides(), *setting("/cache/strands", "both"), *options]
+    assert run(program, scene, tmp_path / "out", *chosen, "--frames", "1-2").returncode == 0
+    assert run(program, scene, tmp_path / "out", *chosen, "--resume").returncode == 0
+    with h5py.File(tmp_path / "out/tiny.h5") as cache:
+        np.testing.assert_array_equal(cache["position"][:], both["position"][:])
+        np.testing.assert_array_equal(cache["guides/position"][:], both["guides/position"][:])
+
+
+def test_only_guides_are_planned(program, scene):
+    def plan(*options):
+        command = [program, "plan", scene, "--json", *options]
+        return json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+
+    without, guided = plan(), plan(*guides())
+    assert guided["strands"] == COUNT and guided["particles"] == COUNT * PARTICLES
+    assert "interpolation" in without["absent"] and "interpolation" not in guided["absent"]
+    stage = next(stage for stage in guided["stages"] if stage["name"] == "interpolation")
+    assert stage["bytes"] > 0 and stage["launches"] == 0
+
+
+@pytest.mark.parametrize(
+    "interpolate, expected",
+    [
+        ({"count": STRANDS + 1}, "/groom/interpolate/count: found 301, expected at most the groom's 300 strands"),
+        ({"group": "fringe"}, '/groom/interpolate/group: found "fringe", expected a group of the groom'),
+        ({"strands": [3, 300]}, "/groom/interpolate/strands/1: found 300, expected a strand of the groom, 0 to 299"),
+        ({}, "#/groom/interpolate: found none of count, group, strands"),
+    ],
+)
+def test_guides_that_do_not_exist_are_named(program, scene, tmp_path, interpolate, expected):
+    result = run(program, scene, tmp_path / "out", *setting("/groom/interpolate", interpolate))
+    assert result.returncode == 3 and expected in result.stderr
+    assert not (tmp_path / "out").exists()

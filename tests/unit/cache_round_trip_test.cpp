@@ -1,6 +1,7 @@
 // What is written is what is read, to the bit, by every compression.
 #include <gmock/gmock.h>
 
+#include "cache/compare.h"
 #include "cache/deflate.h"
 #include "cache/files.h"
 #include "unit/cache_support.h"
@@ -32,6 +33,11 @@ void expect_same(const state::RunHeader& a, const state::RunHeader& b) {
   EXPECT_EQ(a.width, b.width);
   EXPECT_EQ(a.groom_of_strand, b.groom_of_strand);
   EXPECT_EQ(a.groom_names, b.groom_names);
+  EXPECT_EQ(a.interpolation.neighbours, b.interpolation.neighbours);
+  EXPECT_EQ(a.interpolation.guides, b.interpolation.guides);
+  EXPECT_EQ(a.interpolation.guide, b.interpolation.guide);
+  EXPECT_EQ(a.interpolation.weight, b.interpolation.weight);
+  EXPECT_EQ(a.interpolation.guides_apart, b.interpolation.guides_apart);
   ASSERT_EQ(a.surfaces.size(), b.surfaces.size());
   for (std::size_t i = 0; i < a.surfaces.size(); ++i) {
     EXPECT_EQ(a.surfaces[i].name, b.surfaces[i].name);
@@ -44,6 +50,9 @@ void expect_same(const state::Frame& a, const state::Frame& b) {
   EXPECT_EQ(a.time, b.time);
   EXPECT_EQ(a.position, b.position);
   EXPECT_EQ(a.velocity, b.velocity);
+  EXPECT_EQ(a.elongation, b.elongation);
+  EXPECT_EQ(a.living, b.living);
+  EXPECT_EQ(a.guide_position, b.guide_position);
   EXPECT_EQ(a.surface_vertices, b.surface_vertices);
   EXPECT_EQ(a.figures, b.figures);
 }
@@ -57,6 +66,58 @@ TEST_F(CacheTest, HeaderAndFramesComeBackToTheBit) {
     EXPECT_THAT(reader.frames(), ElementsAre(1, 2, 3));
     for (const int number : reader.frames()) expect_same(reader.read(number), small_frame(number));
   }
+}
+
+// Strands 0 and 2 are guides, strand 1 follows both; grooming has cut strand 1.
+state::RunHeader followed_header() {
+  state::RunHeader header = small_header();
+  header.interpolation = {2, {0, 2}, {0, -1, 1, 0, 1, -1}, {1, 0, 0.75f, 0.25f, 1, 0}, true};
+  return header;
+}
+
+state::Frame followed_frame(int number) {
+  state::Frame frame = small_frame(number);
+  frame.living = {2, 4 - number, 3};
+  frame.elongation.assign(9, 0.25f * static_cast<float>(number));
+  for (int i = 0; i < 15; ++i) frame.guide_position.push_back(0.1f * static_cast<float>(i + number));
+  return frame;
+}
+
+TEST_F(CacheTest, FollowersWeightsAndLivingParticlesComeBackToTheBit) {
+  {
+    CacheWriter writer(directory_, followed_header());
+    for (const int number : {1, 2, 3}) writer.write(followed_frame(number), small_snapshot(number), 0.5);
+    writer.finish();
+  }
+  const CacheReader reader(directory_);
+  expect_same(reader.header(), followed_header());
+  for (const int number : reader.frames()) expect_same(reader.read(number), followed_frame(number));
+  write_failed_state(directory_ / "small.failed.h5", followed_header(), followed_frame(2), {"m", "s", 1, 2});
+  const CacheReader failed(directory_ / "small.failed.h5");
+  expect_same(failed.header(), followed_header());
+  expect_same(failed.read(2), followed_frame(2));
+}
+
+TEST_F(CacheTest, AFrameOfOtherLivingParticlesIsNotIdentical) {
+  for (const char* name : {"a", "b"}) {
+    CacheWriter writer(directory_ / name, followed_header());
+    state::Frame frame = followed_frame(1);
+    if (name[0] == 'b') frame.living[1] = 1;
+    writer.write(frame, {}, 0);
+    writer.finish();
+  }
+  const CacheReader a(directory_ / "a"), b(directory_ / "b");
+  EXPECT_FALSE(compare(a, b, {.exact = true}).same);
+  EXPECT_TRUE(compare(a, b, {.tolerance = 0}).same) << "the positions are the same";
+}
+
+TEST_F(CacheTest, GuidesThatNoStrandIsAreRefused) {
+  state::RunHeader header = followed_header();
+  header.interpolation.guides = {0, 3};
+  header.interpolation.guides_apart = false;
+  write_small(directory_, 1, 1, {}, header);
+  EXPECT_THAT(error_of([&] { CacheReader reader(directory_); }).what(),
+              testing::HasSubstr("interpolation/guides names strand 3, which does not exist"));
 }
 
 TEST_F(CacheTest, ManyChunksWithARaggedEndComeBackToTheBit) {

@@ -9,6 +9,7 @@ import json
 import os
 import pathlib
 import re
+import resource
 import subprocess
 import sys
 from functools import cached_property
@@ -71,11 +72,19 @@ def run_scene(scene, label, overrides=None, frames=None, work=WORK, options=()):
         for pointer, value in settings.items():
             command += ["--set", f"{pointer}={json.dumps(value)}"]
         print(f"figures: {label}", file=sys.stderr, flush=True)
+        before = _child_seconds()
         result = subprocess.run([str(part) for part in command], capture_output=True, text=True, check=False)
         if result.returncode not in (0, DIVERGED):
             raise RunError(f"{label}: exit code {result.returncode}: {result.stderr.strip()}")
-        record.write_text(json.dumps({"stamp": stamp, "code": result.returncode, "stderr": result.stderr}))
+        outcome = {"code": result.returncode, "stderr": result.stderr, "cpu_seconds": _child_seconds() - before}
+        record.write_text(json.dumps({"stamp": stamp} | outcome))
     return Run(out)
+
+
+def _child_seconds():
+    """Processor time of the programs that were run so far, on all cores."""
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
 
 
 def _stamp(path, settings):
@@ -91,7 +100,7 @@ class Run:
     def __init__(self, directory):
         self.directory = pathlib.Path(directory)
         record = json.loads((self.directory / "run.json").read_text())
-        self.code, self.log = record["code"], record["stderr"]
+        self.code, self.log, self.cpu_seconds = record["code"], record["stderr"], record.get("cpu_seconds", np.nan)
 
     @property
     def diverged_frame(self):
@@ -214,9 +223,12 @@ class Run:
         return self.deviation(frame)[self.tips]
 
     def edge_strain(self, frame):
-        """[particles] (length / rest length - 1) of the segment before each particle, 0 at roots."""
-        length = _segments(self.position(frame), self.roots)
-        return np.where(self.rest_lengths > 0, length / np.maximum(self.rest_lengths, 1e-30) - 1, 0)
+        """[particles] (length / rest length - 1) of the segment before each particle; 0 at roots, on what is cut off, and
+        for the shortened segment before a cut."""
+        length, living = _segments(self.position(frame), self.roots), self.living(frame)
+        whole = living & np.append(living[1:], True)
+        whole[self.tips] = living[self.tips]
+        return np.where(whole & (self.rest_lengths > 0), length / np.maximum(self.rest_lengths, 1e-30) - 1, 0)
 
     def kinetic_energy(self, frame):
         """Mean over particles, per unit mass [J/kg]. Needs `velocity` in cache.fields."""
@@ -253,6 +265,7 @@ class Run:
             "frames": len(self.frames),
             "substeps": self.scene["model"]["substeps"],
             "ms_per_frame_median": round(float(np.median(self.milliseconds)), 1),
+            "core_ms_per_frame": round(1e3 * self.cpu_seconds / max(1, len(self.frames) - 1), 1),
             "edge_strain_free": self.worst("edge_strain_free"),
             "edge_strain_moved": self.worst("edge_strain_moved"),
             "edge_strain_moved_p999": self.worst("edge_strain_moved_p999"),

@@ -1,7 +1,7 @@
 """Figure 13: procedural growth over helix radius p_h and step length p_tau."""
 from .growth import table
 
-RADII = (0, 15, 30, 45)
+RADII = (0, 10, 20, 30)
 
 
 def make(figures):

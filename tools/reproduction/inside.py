@@ -18,7 +18,7 @@ def inside_solids(points, surfaces, depth=0.0):
         index = np.flatnonzero(near & ~found)
         index = index[inside_mesh(points[index], vertices, triangles)]
         if depth > 0:
-            index = index[distance(points[index], vertices, triangles) > depth]
+            index = index[deeper_than(points[index], depth, vertices, triangles)]
         found[index] = True
     return found
 
@@ -39,7 +39,7 @@ def winding(points, vertices, triangles, way):
     frame = np.stack([across, np.cross(way, across), way])  # rows; the ray goes along the third
     corners, start = (vertices @ frame.T)[triangles], points @ frame.T
     count = np.zeros(len(points), int)
-    for triangle, point in _candidates(corners[..., :2], start[:, :2]):
+    for triangle, point in _candidates(corners[..., :2].min(1), corners[..., :2].max(1), start[:, :2]):
         sign, height = _crossing(corners[triangle], start[point, :2])
         np.add.at(count, point, np.where(height > start[point, 2], sign, 0))
     return count
@@ -61,59 +61,73 @@ def _crossing(corner, at):
     return sign, (u * a[:, 2] + v * b[:, 2] + w * c[:, 2]) / safe
 
 
-def _candidates(corners, at):
-    """Pairs (triangles, points), in parts, of those that share a cell of a grid across the ray."""
-    low, high = corners.min((0, 1)), corners.max((0, 1))
-    cells = int(np.clip(np.sqrt(len(corners)), 8, 256))
-    size = (high - low) / cells + 1e-30
-    first = ((corners.min(1) - low) / size).astype(int).clip(0, cells - 1)
-    last = ((corners.max(1) - low) / size).astype(int).clip(0, cells - 1)
-    triangle, cell = _cells_of(first, last, cells)
-    order = np.argsort(cell, kind="stable")
-    triangle, begin = triangle[order], np.searchsorted(cell[order], np.arange(cells * cells + 1))
+def _candidates(low, high, at):
+    """Pairs (boxes, points), in parts, of those that share a cell of a grid; every box that holds a point is among its
+    pairs. `low`, `high` [boxes, d], `at` [points, d]; d is 2 or 3."""
+    floor, dimensions = low.min(0), low.shape[1]
+    cells = int(np.clip(len(low) ** (1 / dimensions), 8, 256))
+    size = (high.max(0) - floor) / cells + 1e-30
+    strides = cells ** np.arange(dimensions)
 
-    where = ((at - low) / size).astype(int).clip(0, cells - 1)
-    where = where[:, 0] * cells + where[:, 1]
+    def cell_of(points):
+        return ((points - floor) / size).astype(int).clip(0, cells - 1)
+
+    box, cell = _cells_of(cell_of(low), cell_of(high), strides)
+    order = np.argsort(cell, kind="stable")
+    box, begin = box[order], np.searchsorted(cell[order], np.arange(cells**dimensions + 1))
+    where = cell_of(at) @ strides
     many = begin[where + 1] - begin[where]
     part = np.cumsum(many) // PAIRS
-    for number in range(int(part[-1]) + 1 if len(part) else 0):
+    for number in np.unique(part):
         chosen = np.flatnonzero((part == number) & (many > 0))
         point = np.repeat(chosen, many[chosen])
-        offset = np.arange(len(point)) - np.repeat(np.cumsum(many[chosen]) - many[chosen], many[chosen])
-        yield triangle[begin[where[point]] + offset], point
+        yield box[begin[where[point]] + _count_up(many[chosen])], point
 
 
-def _cells_of(first, last, cells):
-    """(triangle, cell) for each cell of a triangle's bounds."""
+def _cells_of(first, last, strides):
+    """(box, cell) for each cell that a box reaches, of its first and last cell along each axis."""
     span = last - first + 1
     many = span.prod(1)
-    triangle = np.repeat(np.arange(len(first)), many)
-    offset = np.arange(len(triangle)) - np.repeat(np.cumsum(many) - many, many)
-    x = first[triangle, 0] + offset // span[triangle, 1]
-    return triangle, x * cells + first[triangle, 1] + offset % span[triangle, 1]
+    box = np.repeat(np.arange(len(first)), many)
+    rest, cell = _count_up(many), np.zeros(len(box), int)
+    for axis, stride in enumerate(strides):
+        cell += stride * (first[box, axis] + rest % span[box, axis])
+        rest //= span[box, axis]
+    return box, cell
+
+
+def _count_up(many):
+    """0, 1, ... many[0] - 1, 0, 1, ... many[1] - 1, ..."""
+    return np.arange(many.sum()) - np.repeat(np.cumsum(many) - many, many)
+
+
+def deeper_than(points, depth, vertices, triangles):
+    """[points] whether no triangle is nearer than `depth`."""
+    corners = np.asarray(vertices, float)[triangles]
+    clear = np.ones(len(points), bool)
+    for triangle, point in _candidates(corners.min(1) - depth, corners.max(1) + depth, points):
+        clear[point[_distance(points[point], corners[triangle]) <= depth]] = False
+    return clear
 
 
 def distance(points, vertices, triangles):
     """[points] to the nearest triangle; every one is looked at, so this is for few points."""
     corners = np.asarray(vertices, float)[triangles]
-    step = max(1, PAIRS // max(1, len(corners)))
-    parts = [_distance(points[k : k + step, None], corners[None]) for k in range(0, len(points), step)]
-    return np.concatenate(parts) if parts else np.zeros(0)
+    return np.array([_distance(point, corners).min() for point in points])
 
 
 def _distance(p, corners):
-    """[points] of [points, 1, 3] to [1, triangles, 3, 3]."""
+    """[n] from points [n, 3] (or one) to triangles [n, 3, 3]."""
     best = np.inf
     for k in range(3):  # the edges
-        a, along = corners[:, :, k], corners[:, :, (k + 1) % 3] - corners[:, :, k]
+        a, along = corners[:, k], corners[:, (k + 1) % 3] - corners[:, k]
         t = ((p - a) * along).sum(-1) / np.maximum((along * along).sum(-1), 1e-30)
         best = np.minimum(best, np.linalg.norm(p - a - np.clip(t, 0, 1)[..., None] * along, axis=-1))
-    a, e, f = corners[:, :, 0], corners[:, :, 1] - corners[:, :, 0], corners[:, :, 2] - corners[:, :, 0]
+    a, e, f = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     normal = np.cross(e, f)
     size = (normal * normal).sum(-1)
     flat = size <= 1e-12 * (e * e).sum(-1) * (f * f).sum(-1)  # no plane: its edges are all there is
     size = np.where(flat, 1, size)
     s, t = (np.cross(p - a, f) * normal).sum(-1) / size, (np.cross(e, p - a) * normal).sum(-1) / size
     height = np.abs(((p - a) * normal).sum(-1)) / np.sqrt(size)
-    best = np.where(~flat & (s >= 0) & (t >= 0) & (s + t <= 1), np.minimum(best, height), best)
-    return best.min(1)
+    return np.where(~flat & (s >= 0) & (t >= 0) & (s + t <= 1), np.minimum(best, height), best)

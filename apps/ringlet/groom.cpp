@@ -2,41 +2,14 @@
 
 #include <fmt/format.h>
 
-#include <cstdlib>
-
+#include "cache/reader.h"
 #include "core/error.h"
 #include "groom/groom.h"
+#include "groom_files.h"
 #include "scene/scene.h"
 #include "solids/mesh.h"
 
 namespace ringlet::app {
-namespace {
-
-void check_output(const std::filesystem::path& output) {
-  if (output.extension() != ".h5")
-    throw Error(ErrorKind::kUsage, output.string(), "a groom is written as HDF5",
-                "give an output that ends in .h5");
-}
-
-void write_groom(const std::filesystem::path& output, const groom::Strands& strands, scene::Axis up) {
-  groom::write(output, strands, up);
-  fmt::print("wrote {}: {} strands, {} particles\n", output.string(), strands.size(), strands.particles());
-}
-
-double metres_in(const std::string& unit) {
-  static constexpr std::pair<const char*, double> kUnits[] = {
-      {"m", 1}, {"cm", 0.01}, {"mm", 0.001}, {"in", 0.0254}, {"ft", 0.3048}};
-  for (const auto& [name, metres] : kUnits)
-    if (unit == name) return metres;
-  char* end = nullptr;
-  const double metres = std::strtod(unit.c_str(), &end);
-  if (end == unit.c_str() || *end != '\0' || !(metres > 0) || metres > 1e9)
-    throw Error(ErrorKind::kUsage, "--unit", fmt::format("`{}` is no unit of length", unit),
-                "give m, cm, mm, in, ft, or the metres in one unit");
-  return metres;
-}
-
-}  // namespace
 
 int run_groom_grow(const GroomGrowOptions& options) {
   check_output(options.output);
@@ -55,15 +28,58 @@ int run_groom_grow(const GroomGrowOptions& options) {
               "name one that grows");
 }
 
-int run_groom_convert(const GroomConvertOptions& options) {
+int run_groom_convert(const GroomFileOptions& options) {
   check_output(options.output);
-  if (options.up != "x" && options.up != "y" && options.up != "z")
-    throw Error(ErrorKind::kUsage, "--up", fmt::format("`{}` is no axis", options.up), "give x, y or z");
-  const scene::Axis up = options.up == "x"   ? scene::Axis::kX
-                         : options.up == "y" ? scene::Axis::kY
-                                             : scene::Axis::kZ;
-  const scene::Units units{metres_in(options.unit), up};
-  write_groom(options.output, groom::read(options.input, options.skin, {}, units), up);
+  write_groom(options.output, read_groom(options), units_of(options).up);
+  return 0;
+}
+
+// ---- A frame of a cache --------------------------------------------------------------------------------
+
+namespace {
+
+state::Frame read_frame(const cache::CacheReader& reader, int number) {
+  const std::vector<int>& frames = reader.frames();
+  if (std::find(frames.begin(), frames.end(), number) != frames.end()) return reader.read(number);
+  const std::string there = frames.empty() ? "none" : fmt::format("{} to {}", frames.front(), frames.back());
+  throw Error(ErrorKind::kUsage, "--frame",
+              fmt::format("{} has no frame {}, there are {}", reader.file().string(), number, there));
+}
+
+// The strands as the frame has them, in metres; what grooming has cut off is gone.
+groom::Strands strands_of(const state::RunHeader& header, const state::Frame& frame) {
+  groom::Strands strands;
+  strands.group_names = header.groom_names;
+  strands.groups = header.groom_of_strand;
+  for (std::size_t s = 0; s + 1 < header.offsets.size(); ++s) {
+    const auto first = static_cast<std::size_t>(header.offsets[s]);
+    const auto end = frame.living.empty() ? static_cast<std::size_t>(header.offsets[s + 1])
+                                          : first + static_cast<std::size_t>(frame.living[s]);
+    for (std::size_t i = first; i < end; ++i) {
+      strands.points.push_back(header.metres_per_unit *
+                               Eigen::Map<const Eigen::Vector3f>(&frame.position[3 * i]).cast<double>());
+      strands.widths.push_back(static_cast<float>(header.metres_per_unit * header.width[i]));
+    }
+    strands.offsets.push_back(static_cast<std::int64_t>(strands.points.size()));
+    strands.roots.push_back(
+        {header.root_triangle[s],
+         Eigen::Map<const Eigen::Vector3f>(&header.root_barycentric[3 * s]).cast<double>()});
+  }
+  const auto nowhere = [](const groom::RootSite& root) { return root.triangle < 0; };
+  if (std::all_of(strands.roots.begin(), strands.roots.end(), nowhere)) strands.roots.clear();
+  return strands;
+}
+
+}  // namespace
+
+int run_groom_rest(const GroomRestOptions& options) {
+  check_output(options.output);
+  const cache::CacheReader reader(options.cache);
+  const std::string& up = reader.header().up;
+  write_groom(options.output, strands_of(reader.header(), read_frame(reader, options.frame)),
+              up == "x"   ? scene::Axis::kX
+              : up == "y" ? scene::Axis::kY
+                          : scene::Axis::kZ);
   return 0;
 }
 

@@ -2,24 +2,28 @@
 // (core/error.h).
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <cstdio>
-#include <functional>
 #include <new>
 
 #include "bench.h"
+#include "command.h"
 #include "compare.h"
 #include "core/log.h"
-#include "groom.h"
 #include "info.h"
 #include "plan.h"
 #include "run.h"
 #include "scene/scene.h"
 
 namespace ringlet::app {
-namespace {
 
-using Job = std::function<int()>;
+void add_scene(CLI::App& command, std::string& file, std::vector<std::string>& overrides) {
+  command.add_option("SCENE", file, "scene file (JSON)")->required();
+  command.add_option("--set", overrides, "change a value of the scene; null removes; repeatable")
+      ->allow_extra_args(false)
+      ->option_text("POINTER=JSON");
+}
+
+namespace {
 
 template <class Enum>
 CLI::CheckedTransformer words(std::map<std::string, Enum> values) {
@@ -42,13 +46,6 @@ void add_machine(CLI::App& command, pipeline::Options& options, int& threads) {
   command.add_option("--threads", threads, "CPU threads; all by default")
       ->check(CLI::Range(1, 4096))
       ->option_text("N");
-}
-
-void add_scene(CLI::App& command, std::string& file, std::vector<std::string>& overrides) {
-  command.add_option("SCENE", file, "scene file (JSON)")->required();
-  command.add_option("--set", overrides, "change a value of the scene; null removes; repeatable")
-      ->allow_extra_args(false)
-      ->option_text("POINTER=JSON");
 }
 
 void add_run(CLI::App& app, const bool& quiet, Job& job) {
@@ -117,34 +114,6 @@ void add_compare(CLI::App& app, Job& job) {
   command->add_flag("--exact", options->exact, "the same bits")->excludes(tolerance);
   command->add_flag("--json", options->json, "as JSON");
   command->callback([options, &job] { job = [options] { return run_compare(*options); }; });
-}
-
-void add_groom(CLI::App& app, Job& job) {
-  CLI::App* group = app.add_subcommand("groom", "grow and convert grooms");
-  group->require_subcommand(1);
-  CLI::App* grow = group->add_subcommand("grow", "grow a scene's procedural groom into a groom file");
-  const auto growing = std::make_shared<GroomGrowOptions>();
-  add_scene(*grow, growing->scene, growing->overrides);
-  grow->add_option("--groom", growing->groom, "which groom of the scene")->option_text("NAME");
-  grow->add_option("-o,--output", growing->output, "groom file to write (.h5)")
-      ->required()
-      ->option_text("FILE");
-  grow->callback([growing, &job] { job = [growing] { return run_groom_grow(*growing); }; });
-
-  CLI::App* convert = group->add_subcommand("convert", "read any groom and write it as Ringlet's own");
-  const auto converting = std::make_shared<GroomConvertOptions>();
-  convert->add_option("INPUT", converting->input, ".hair, .data, .tfx or .h5")->required();
-  convert->add_option("--skin", converting->skin, ".tfxskin with the stored roots")->option_text("FILE");
-  convert
-      ->add_option("--unit", converting->unit,
-                   "of the input where it declares none: m, cm, mm, in, ft or metres")
-      ->option_text("UNIT");
-  convert->add_option("--up", converting->up, "up axis of the input where it declares none")
-      ->option_text("x/y/z");
-  convert->add_option("-o,--output", converting->output, "groom file to write (.h5)")
-      ->required()
-      ->option_text("FILE");
-  convert->callback([converting, &job] { job = [converting] { return run_groom_convert(*converting); }; });
 }
 
 void add_bench(CLI::App& app, Job& job) {

@@ -22,6 +22,9 @@ struct Scalp {
 Strands read(const std::filesystem::path& file, const std::optional<std::filesystem::path>& skin,
              const scene::UnitsOverride& units, const scene::Units& scene_units);
 
+// What such a file says of its unit and up axis; only Ringlet's own says anything.
+scene::UnitsOverride declared_units(const std::filesystem::path& file);
+
 // Grows strands on the head: physics.md section 9. Deterministic in the seed on every machine.
 Strands grow(const scene::Grow& parameters, const Scalp& scalp, scene::Axis up);
 

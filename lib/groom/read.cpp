@@ -105,4 +105,8 @@ Strands read(const std::filesystem::path& file, const std::optional<std::filesys
   return std::move(groom.strands);
 }
 
+scene::UnitsOverride declared_units(const std::filesystem::path& file) {
+  return format_of(InputFile(file)) == Format::kH5 ? read_h5(file).declared : scene::UnitsOverride{};
+}
+
 }  // namespace ringlet::groom

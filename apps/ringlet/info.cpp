@@ -7,6 +7,7 @@
 #include "cache/reader.h"
 #include "core/error.h"
 #include "groom/groom.h"
+#include "groom/measure.h"
 #include "report.h"
 #include "scene/scene.h"
 #include "solids/mesh.h"
@@ -190,25 +191,44 @@ Report describe_cache_file(const InfoOptions& options) {
 
 constexpr scene::Units kMetres{1, scene::Axis::kY};
 
+// Those of a summary's figures that are asked for; null where there was nothing to measure.
+Report figures_of(const std::optional<groom::Summary>& summary,
+                  const std::vector<std::pair<const char*, double groom::Summary::*>>& figures) {
+  if (!summary) return {};
+  Report report = Report::object();
+  for (const auto& [name, figure] : figures) report[name] = number((*summary).*figure);
+  return report;
+}
+
+Report measures_of(const groom::Strands& strands) {
+  using groom::Summary;
+  const groom::Measures measures = groom::measure(strands);
+  Report report = Report::object();
+  report["length"] = figures_of(measures.length, {{"min", &Summary::min},
+                                                  {"mean", &Summary::mean},
+                                                  {"median", &Summary::median},
+                                                  {"max", &Summary::max}});
+  report["segment_length"] = figures_of(
+      measures.segment, {{"min", &Summary::min}, {"mean", &Summary::mean}, {"max", &Summary::max}});
+  report["curvature"] = figures_of(
+      measures.curvature,
+      {{"mean", &Summary::mean}, {"percentile_99", &Summary::percentile_99}, {"max", &Summary::max}});
+  report["root_density"] = measures.root_density ? number(*measures.root_density) : Report();
+  return report;
+}
+
 Report describe_groom(const InfoOptions& options) {
   const groom::Strands strands = groom::read(options.file, {}, {}, kMetres);
   const auto at = [&](std::size_t i) { return strands.points[i]; };
-  double length = 0, longest = 0;
-  for (std::size_t strand = 0; strand < strands.size(); ++strand) {
-    double sum = 0;
-    for (auto i = strands.offsets[strand] + 1; i < strands.offsets[strand + 1]; ++i)
-      sum += (at(static_cast<std::size_t>(i)) - at(static_cast<std::size_t>(i) - 1)).norm();
-    length += sum;
-    longest = std::max(longest, sum);
-  }
   Report report = {{"kind", "groom"}, {"strands", strands.size()}, {"particles", strands.particles()}};
   report["particles_per_strand"] = particles_per_strand(strands.offsets);
   report["groups"] = strand_counts(strands.groups, strands.group_names);
   const bool declares = options.file.extension() == ".h5";
-  report["units"] = {{"length", declares ? "m" : "the file's own: its format declares none"}};
-  report["length"] = {
-      {"mean", number(length / static_cast<double>(std::max<std::size_t>(strands.size(), 1)))},
-      {"longest", number(longest)}};
+  const std::string unit = declares ? "m" : "unit";
+  report["units"] = {{"length", declares ? "m" : "the file's own: its format declares none"},
+                     {"curvature", "1/" + unit},
+                     {"root_density", "roots/" + unit + "^2"}};
+  report.update(measures_of(strands));
   report["widths"] = !strands.widths.empty();
   report["stored_roots"] = !strands.roots.empty();
   report["bounds"] = bounds(strands.points.size(), at);

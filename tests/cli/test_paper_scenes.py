@@ -8,9 +8,11 @@ import pytest
 
 from conftest import SOURCE, run
 from reproduction.common import SCENES, Run, grooms_of, read_scene, run_scene, thinned
-from reproduction.inside import distance, inside_mesh
 from reproduction.fig06_wig import few_strands, sag
+from reproduction.fig07_hand import HAND
 from reproduction.fig08_sphere import INNER, OUTER, caught, from_centre
+from reproduction.fig11_grooming import CUT, apart
+from reproduction.inside import deeper_than, distance, inside_mesh
 from small_cache import RADIUS, ball
 from test_make_head import read_obj
 
@@ -142,6 +144,21 @@ def test_hair_is_in_the_sphere_and_round_it(reduced):
     assert (abs(radius - OUTER) < 1e-4).sum() > 5  # and on the outer
 
 
+def test_skinned_strands_go_through_the_hand_and_simulated_ones_do_not(reduced):
+    guides = reduced("hand", {"/groom/interpolate": {"count": 12}})
+    frames = REDUCED["hand"][2]
+    inside = {run: [int(run.inside(frame, DEPTH, HAND).sum()) for frame in frames] for run in (reduced("hand"), guides)}
+    assert max(inside[reduced("hand")]) == 0 and max(inside[guides]) > 10
+
+
+def test_hair_that_is_cut_moves_otherwise_than_its_picture_cut(reduced):
+    cut, uncut = reduced("grooming"), reduced("grooming", {"/effects/grooming": None})
+    assert cut.living(CUT - 1).all() and 0.6 < cut.living(CUT).mean() < 0.9
+    assert cut.position(CUT)[cut.living(CUT)][:, 1].min() > 0.12  # the box's upper side is at 0.13, and hair swings
+    assert apart(cut, uncut, CUT)["median"] < 1e-7
+    assert apart(cut, uncut, 40)["median"] > 2e-3
+
+
 @pytest.mark.parametrize(
     "parameter, values, measure, rises",
     [
@@ -191,7 +208,9 @@ def test_crossings_tell_inside_from_outside():
     radius = np.linalg.norm(points, axis=1)
     clear = abs(radius - RADIUS) > 3e-4  # the mesh is a little smaller than the ball
     assert (inside_mesh(points, vertices, triangles) == (radius < RADIUS))[clear].all()
-    assert abs(distance(points[:200], vertices, triangles) - abs(radius[:200] - RADIUS)).max() < 3e-4
+    away = distance(points[:200], vertices, triangles)
+    assert abs(away - abs(radius[:200] - RADIUS)).max() < 3e-4
+    assert (deeper_than(points[:200], 0.01, vertices, triangles) == (away > 0.01)).all()
 
 
 def test_a_particle_in_a_solid_is_found(reduced, monkeypatch):

@@ -224,10 +224,11 @@ class Run:
 
     def edge_strain(self, frame):
         """[particles] (length / rest length - 1) of the segment before each particle; 0 at roots, on what is cut off, and
-        for the shortened segment before a cut."""
-        length, living = _segments(self.position(frame), self.roots), self.living(frame)
-        whole = living & np.append(living[1:], True)
-        whole[self.tips] = living[self.tips]
+        in a scene with grooming for each strand's last segment, which a cut may have made shorter."""
+        length, whole = _segments(self.position(frame), self.roots), self.living(frame)
+        if self.scene["effects"].get("grooming"):
+            whole &= np.append(whole[1:], False)
+            whole[self.tips] = False
         return np.where(whole & (self.rest_lengths > 0), length / np.maximum(self.rest_lengths, 1e-30) - 1, 0)
 
     def kinetic_energy(self, frame):

@@ -142,7 +142,8 @@ def test_comb_turns_strands_along_the_curve(edit, program, tmp_path_factory):
     root, tip = combed.roots_and_tips
     before = strands()
     assert np.allclose(combed.lengths, LENGTH, atol=1e-6) and np.allclose(root, before[:, 0], atol=1e-9)
-    was, now = (np.linalg.norm(tips - np.clip(tips, [0, 0.1, 0], [0.5, 0.1, 0]), axis=1) for tips in (before[:, -1], tip))
+    low, high = [0, 0.1, 0], [0.5, 0.1, 0]
+    was, now = (np.linalg.norm(tips - np.clip(tips, low, high), axis=1) for tips in (before[:, -1], tip))
     assert np.all(now < was) and np.median(now) < 0.3 * np.median(was)
 
     curve = tmp_path_factory.mktemp("curve") / "curve.data"

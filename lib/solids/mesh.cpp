@@ -133,6 +133,8 @@ struct AnimatedMesh::Impl {
       times.insert(seconds(frame));
     for (const auto* keys : {&animation.keys, &animation.carrier})
       for (const scene::Key& key : *keys) times.insert(seconds(key.frame - frames.first) / animation.speed);
+    for (std::size_t k = 0; k < sequence.frames.size(); ++k)
+      times.insert(seconds(static_cast<double>(k)) / animation.speed);
     if (rig.has_clip) {
       const double period = animation.loop && rig.clip_length > 0
                                 ? rig.clip_length
@@ -170,6 +172,10 @@ struct AnimatedMesh::Impl {
     if (motion == Motion::kStill) return {};
     std::vector<Vec3> now(rest.size());
     sample(time, now);
+    return nearest_pose(now);
+  }
+
+  Pose nearest_pose(std::span<const Vec3> now) const {
     const std::vector<Vec3> now_witnesses = pick<Vec3>(now, witnesses);
     return now_witnesses == rest_witnesses ? Pose{} : fit_pose(rest_witnesses, now_witnesses);
   }
@@ -201,6 +207,9 @@ const std::vector<Vec3>& AnimatedMesh::rest_vertices() const { return impl_->res
 AnimatedMesh::Motion AnimatedMesh::motion() const { return impl_->motion; }
 double AnimatedMesh::duration() const { return impl_->duration(); }
 Pose AnimatedMesh::pose(double time) const { return impl_->pose(time); }
+Pose AnimatedMesh::nearest_pose(std::span<const Vec3> vertices) const {
+  return impl_->nearest_pose(vertices);
+}
 
 void AnimatedMesh::sample(double time, std::span<Vec3> out) const {
   switch (impl_->motion) {

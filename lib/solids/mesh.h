@@ -42,6 +42,9 @@ class AnimatedMesh {
 
   // The pose that takes the rest vertices to those at `time` (motion() still or rigid only).
   Pose pose(double time) const;
+  // The rigid pose that takes the rest vertices nearest to these, a sample of all: how a deforming mesh
+  // travels and turns as a whole.
+  Pose nearest_pose(std::span<const Vec3> vertices) const;
 
  private:
   struct Impl;

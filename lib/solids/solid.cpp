@@ -20,6 +20,13 @@ namespace {
 using Motion = AnimatedMesh::Motion;
 using Vertices = std::vector<Eigen::Vector3f>;
 
+// A surface as it travels: a rigid pose, and what is left of its motion in the axes that move with that.
+// Level sets of two frames are then near each other however fast the whole goes.
+struct Carried {
+  Pose pose;
+  Vertices vertices;
+};
+
 constexpr double kMostVoxels = 2048;   // along the longest axis: a surface of that size is some 10^7 voxels
 constexpr double kSameInstant = 1e-6;  // of a frame
 
@@ -53,11 +60,6 @@ float voxel_size(const scene::Solid& desc, double longest) {
             voxel, longest, kMostVoxels),
         "take a larger voxel");
   return static_cast<float>(voxel);
-}
-
-void set_placement(double (&rotation)[9], double (&translation)[3], const Mat3& turn, const Vec3& shift) {
-  Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>{rotation} = turn;
-  Eigen::Map<Vec3>{translation} = shift;
 }
 
 }  // namespace
@@ -98,10 +100,17 @@ struct Solid::Impl {
     return result;
   }
 
-  Vertices local_at(double time) const {
-    std::vector<Vec3> vertices(surface.vertex_count());
-    mesh.sample(time, std::span(vertices).first(mesh.vertex_count()));
-    return local(std::move(vertices));
+  Carried carried_at(double time) const {
+    std::vector<Vec3> vertices(mesh.vertex_count());
+    mesh.sample(time, vertices);
+    const Pose pose = mesh.nearest_pose(vertices);
+    for (Vec3& v : vertices) v = pose.rotation.transpose() * (v - pose.position);
+    return {pose, local(std::move(vertices))};
+  }
+
+  void place(double (&rotation)[9], double (&translation)[3], const Pose& pose) const {
+    Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>{rotation} = pose.rotation;
+    Eigen::Map<Vec3>{translation} = pose.rotation * origin + pose.position;
   }
 
   void warn_if_empty(const LevelSet& level_set) const {
@@ -146,17 +155,15 @@ struct Solid::Impl {
   }
 
   void place_rigid(double time_before, double time) {
-    const Pose before = mesh.pose(time_before), after = mesh.pose(time);
-    set_placement(view.rotation_before, view.translation_before, before.rotation,
-                  before.rotation * origin + before.position);
-    set_placement(view.rotation, view.translation, after.rotation, after.rotation * origin + after.position);
+    place(view.rotation_before, view.translation_before, mesh.pose(time_before));
+    place(view.rotation, view.translation, mesh.pose(time));
   }
 
   // ---- Deforming --------------------------------------------------------------------------------
 
   // On the queue's thread. A frame that looks like the last one built shares its level set.
   FrameSurface build_frame(int frame) {
-    Vertices now = local_at(frame / fps);
+    Vertices now = carried_at(frame / fps).vertices;
     if (last_built.level_set && now == last_built_vertices) return last_built;
     const Timer timer;
     last_built = surface_of(now);
@@ -172,15 +179,20 @@ struct Solid::Impl {
     if (!frame || *frame != now) pair = queue->at(now), join_folds();
     frame = now;
     show(pair, std::clamp(time * fps - now, 0.0, 1.0));
-    if (!vertices_time || *vertices_time != time_before) vertices = local_at(time_before);
+    if (!surface_time || *surface_time != time_before) move_surface(time_before);
     vertices_before.swap(vertices);
-    vertices = local_at(time);
-    vertices_time = time;
+    place(view.rotation_before, view.translation_before, surface_pose);
+    move_surface(time);
     find_folds();
+    place(view.rotation, view.translation, surface_pose);
     view.vertices_before = vertices_before.front().data();
     view.vertices = vertices.front().data();
-    set_placement(view.rotation_before, view.translation_before, Mat3::Identity(), origin);
-    set_placement(view.rotation, view.translation, Mat3::Identity(), origin);
+  }
+
+  void move_surface(double time) {
+    Carried now = carried_at(time);
+    surface_pose = now.pose, vertices = std::move(now.vertices);
+    surface_time = time;
   }
 
   void show(const LevelSetQueue::Pair& level_sets, double blend) {
@@ -208,9 +220,10 @@ struct Solid::Impl {
   std::vector<unsigned char> folded_tiles;  // likewise
   Vertices vertices, vertices_before;       // at the substep's end and start
 
-  std::optional<int> frame;             // whose level sets `pair` holds (deforming)
-  std::optional<double> vertices_time;  // of `vertices` (deforming)
-  Vertices last_built_vertices;         // the queue's thread alone
+  std::optional<int> frame;            // whose level sets `pair` holds (deforming)
+  std::optional<double> surface_time;  // of `vertices` and the pose (deforming)
+  Pose surface_pose;
+  Vertices last_built_vertices;  // the queue's thread alone
   FrameSurface last_built;
   std::optional<LevelSetQueue> queue;  // last: its thread uses the others
 };

@@ -253,6 +253,42 @@ TEST_F(MeshTest, NumberedFilesAreFramesFromTheFirst) {
   expect_near(sample(AnimatedMesh(looped, kMetresYUp, {1, 10, 24, 0}), 2.5 / 24), moved(2.5), 1e-6);
 }
 
+// Clips, sequences, the asset's keys and the scene's, with preroll before them: all at once so many times as
+// fast, and over so much sooner.
+TEST_F(MeshTest, SpeedRunsEveryKindOfMotionAlike) {
+  for (int number = 1; number <= 40; ++number)
+    write_obj(directory / fmt::format("ball{}.obj", number), sphere(1, {0.1 * number * number, 0, 0}, 6, 8));
+  scene::MeshDesc clip = mesh_desc(turning_node(), "turn"), sequence = mesh_desc(directory / "ball#.obj");
+  for (scene::MeshDesc* desc : {&clip, &sequence})
+    for (const bool loop : {false, true}) {
+      desc->animation.loop = loop;
+      desc->animation.keys = {{1, Vec3(1, 0, 0), Quat::Identity(), 1},
+                              {9, Vec3(0, 2, 0), Quat::Identity(), 2}};
+      desc->animation.carrier = {{1, Vec3::Zero(), Quat::Identity(), 1},
+                                 {25, Vec3(0, 0, 9), Quat(Eigen::AngleAxisd(1.0, Vec3::UnitX())), 1},
+                                 {31, Vec3::Zero(), Quat::Identity(), 1}};
+      desc->animation.speed = 1;
+      const AnimatedMesh slow(*desc, kMetresYUp, {1, 97, 24, 12});
+      for (const double speed : {0.5, 3.0, 10.0}) {
+        desc->animation.speed = speed;
+        const AnimatedMesh fast(*desc, kMetresYUp, {1, 97, 24, 12});
+        for (const double time : {0.0, 0.01, 0.137, 0.3, 0.77, 1.9})
+          expect_near(sample(fast, time), sample(slow, speed * time), 1e-9);
+        for (const double time : {-0.5, -0.3}) expect_near(sample(fast, time), sample(slow, time), 1e-12);
+        EXPECT_NEAR(fast.duration(), slow.duration() / speed, 1e-12);
+      }
+    }
+}
+
+// Four times as fast every frame of the run, and the middle between any two, shows an even file.
+TEST_F(MeshTest, ASequenceThatDeformsBetweenFramesDeforms) {
+  for (int number = 0; number < 20; ++number)
+    write_obj(directory / fmt::format("ball{}.obj", number), sphere(number % 2 ? 1.1 : 1, {3, 0, 0}, 6, 8));
+  scene::MeshDesc desc = mesh_desc(directory / "ball#.obj");
+  desc.animation.speed = 4;
+  EXPECT_EQ(AnimatedMesh(desc, kMetresYUp, {1, 5, 24, 0}).motion(), Motion::kDeforming);
+}
+
 TEST_F(MeshTest, SequenceKeepsApartWhatOnlyStartsTogether) {
   // Two quads that touch in the first file along an edge whose ends have two vertices each, and part in the
   // second.

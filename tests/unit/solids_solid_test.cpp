@@ -104,6 +104,53 @@ TEST_F(SolidTest, ADeformingOneBlendsTheFramesAroundTheSubstep) {
   EXPECT_EQ(solid.bytes(), bytes);
 }
 
+// The scene's motion, ten times as fast, over what the asset does itself: at a substep's two ends every
+// vertex is where the keys say, so that its velocity is the finite difference of theirs. What a deforming one
+// keeps in its own axes is its deformation alone.
+TEST_F(SolidTest, ACarrierGivesItsVelocityToRigidAndDeformingOnes) {
+  const scene::Frames frames{1, 25, 24, 0};
+  constexpr double kSpeed = 10, kEnd = 1.0 / kSpeed;  // [s] of the ride
+  const auto ride = [&](const std::filesystem::path& file) {
+    scene::MeshDesc desc = mesh_desc(file);
+    desc.animation.carrier_interpolation = scene::Interpolation::kLinear;
+    desc.animation.carrier = {{1, Vec3::Zero(), Quat::Identity(), 1},
+                              {25, Vec3(40, -8, 3), Quat(Eigen::AngleAxisd(2.0, Vec3::UnitZ())), 1}};
+    desc.animation.speed = kSpeed;
+    return AnimatedMesh(desc, kMetresYUp, frames);
+  };
+  write_obj(directory / "rigid.obj", sphere(0.1, {1, 0, 0}, 16, 32));
+  for (int number = 1; number <= 60; ++number)
+    write_obj(directory / fmt::format("ball{}.obj", number),
+              sphere(0.1 + 0.002 * (number % 2), {1, 0, 0}, 16, 32));
+  for (const char* name : {"rigid.obj", "ball#.obj"}) {
+    const AnimatedMesh mesh = ride(directory / name);
+    const bool deforms = std::string(name) != "rigid.obj";
+    ASSERT_EQ(mesh.motion(), deforms ? AnimatedMesh::Motion::kDeforming : AnimatedMesh::Motion::kRigid);
+    Solid solid(solid_desc(40), mesh, frames, 0, {});
+    const auto place = [&](double time, const Vec3& rest) -> Vec3 {
+      const double told = std::min(kSpeed * time, 1.0), frame = 24 * kSpeed * time,
+                   part = frame - std::floor(frame);
+      const auto radius = [](double number) { return 0.1 + 0.002 * (std::fmod(number + 1, 2) == 1); };
+      const double now =
+          deforms ? radius(std::floor(frame)) * (1 - part) + radius(std::floor(frame) + 1) * part : 0.1;
+      const Vec3 centre(1, 0, 0), own = centre + now * (rest - centre).normalized();
+      return Eigen::AngleAxisd(2.0 * told, Vec3::UnitZ()) * own + told * Vec3(40, -8, 3);
+    };
+    for (const double t0 : {0.013, 0.0417, 0.071}) {
+      const double t1 = t0 + 1.0 / 1920;
+      ASSERT_LT(t1, kEnd);
+      const kernels::SolidView& view = solid.at(t0, t1);
+      for (std::size_t v = 0; v < mesh.vertex_count(); v += 17) {
+        const Vec3 before = place(t0, mesh.rest_vertices()[v]), now = place(t1, mesh.rest_vertices()[v]);
+        EXPECT_LE((vertex_before(view, v) - before).norm(), 2e-7) << name;
+        EXPECT_LE((vertex_now(view, v) - now).norm(), 2e-7) << name;
+        EXPECT_LE((vertex_now(view, v) - vertex_before(view, v) - (now - before)).norm(), 2e-8) << name;
+        EXPECT_LT(Eigen::Map<const Eigen::Vector3f>(view.vertices + 3 * v).norm(), 0.11f) << name;
+      }
+    }
+  }
+}
+
 TEST_F(SolidTest, SubstepsMeet) {
   const AnimatedMesh mesh = growing();
   Solid solid(solid_desc(24), mesh, {1, 5, 24, 0}, 0, {});

@@ -25,6 +25,11 @@ void ShelterMap::draw(std::span<const Vec3> vertices, std::span<const Triangle> 
   for (const Triangle& t : triangles) draw_triangle(seen[t[0]], seen[t[1]], seen[t[2]]);
 }
 
+void ShelterMap::reserve() {
+  constexpr std::size_t kMost = std::size_t{kCells + 1} * (kCells + 1);
+  front_.reserve(kMost), rear_.reserve(kMost);
+}
+
 void ShelterMap::mark(int column, int row, double depth) {
   if (column < 0 || row < 0 || column >= columns_ || row >= rows_) return;
   const std::size_t cell = static_cast<std::size_t>(row) * columns_ + column;

@@ -11,8 +11,10 @@ namespace ringlet::effects {
 
 class ShelterMap {
  public:
-  // Draws the mesh as seen along `wind` (not zero) into a grid of square cells, kCells along its longer side.
+  // Draws the mesh as seen along `wind` (not zero) into a grid of square cells, kCells and one along its longer side.
   void draw(std::span<const Vec3> vertices, std::span<const Triangle> triangles, const Vec3& wind);
+
+  void reserve();  // all that `draw` will ever hold
 
   kernels::ShelterMap view() const;  // valid until the next `draw`
   std::size_t bytes() const { return (front_.capacity() + rear_.capacity()) * sizeof(float); }

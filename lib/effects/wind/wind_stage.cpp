@@ -20,6 +20,7 @@ class WindStage : public Stage<T> {
     state_.air.assign(state_.position.size(), T(0));
     if (!shelter_) return;
     exposure_.assign(state_.position.size() / 3, T(1));
+    map_.reserve();
     head_vertices_.resize(head_->vertex_count());
   }
 
@@ -31,17 +32,20 @@ class WindStage : public Stage<T> {
   std::int64_t launches() const override { return substeps_ + (shelter_ ? 1 : 0); }
 
   void run(Executor<T>& executor, const Substep& substep, FrameReport&) override {
-    if (shelter_ && substep.first_of_frame) find_shelter(executor, substep.time);
+    if (substep.first_of_frame) sheltered_ = false;
+    if (shelter_ && !sheltered_) find_shelter(executor, substep.time);
     executor.wind_step({model_.view(), state_.position.data(), state_.root_points.data(),
-                        field_.at<T>(substep.time), exposure_.empty() ? nullptr : exposure_.data(),
+                        field_.at<T>(substep.time), sheltered_ ? exposure_.data() : nullptr,
                         state_.air.data()});
   }
 
  private:
-  // Once a frame: the head and the mean wind turn slowly beside the hair.
+  // Once a frame, as soon as the wind blows in it: head and mean wind turn slowly beside the hair. What was
+  // before the frame does not matter: a resumed run finds the same.
   void find_shelter(Executor<T>& executor, double time) {
     const Vec3 wind = field_.mean(time);
     if (wind == Vec3::Zero()) return;  // nothing to be sheltered from
+    sheltered_ = true;
     head_->sample(time, head_vertices_);
     map_.draw(head_vertices_, head_->triangles(), wind);
     executor.shelter_step({model_.view(), state_.position.data(), state_.root_points.data(), map_.view(),
@@ -56,6 +60,7 @@ class WindStage : public Stage<T> {
   const state::StrandModel<T>& model_;
   state::StrandState<T>& state_;
   state::AlignedVector<T> exposure_;  // [rows] or empty
+  bool sheltered_ = false;            // `exposure_` holds for this frame
   ShelterMap map_;
   std::vector<Vec3> head_vertices_;
 };

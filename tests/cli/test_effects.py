@@ -14,7 +14,8 @@ SOFT = {"curve": [[0.02, 0.02], [0.1, 0.05]]}
 
 
 def run(program, scene, out, *options):
-    return subprocess.run([program, "run", scene, "-o", out, "--progress", "none", *options], capture_output=True, text=True)
+    command = [program, "run", scene, "-o", out, "--progress", "none", *options]
+    return subprocess.run(command, capture_output=True, text=True)
 
 
 def setting(pointer, value):
@@ -53,7 +54,8 @@ def test_the_plan_says_what_wind_takes(program, scene):
     stage = plan(program, scene, *setting("/effects/wind", {"velocity": [4, 0, 1]}))["wind"]
     assert (stage["bytes"], stage["launches"]) == (air, (LAST - 1) * 4)
     stage = plan(program, scene, *setting("/effects/wind", WIND))["wind"]
-    exposure, shelter_map, head = rows * 16 * 4, 2 * 193 * 193 * 4, len(np.unique(ball()[0].round(9), axis=0)) * 3 * 8  # seams joined
+    exposure, shelter_map = rows * 16 * 4, 2 * 193 * 193 * 4
+    head = len(np.unique(ball()[0].round(9), axis=0)) * 3 * 8  # seams joined
     assert (stage["bytes"], stage["launches"]) == (air + exposure + shelter_map + head, (LAST - 1) * (4 + 1))
 
 
@@ -97,9 +99,12 @@ def test_the_head_shelters_what_is_behind_it(program, tmp_path):
 
     file = write_scene(tmp_path, change)
     wind = {"velocity": [1, 0, 0]}
+    effects = {
+        "none": {"velocity": [0, 0, 0]}, "open": wind, "half": {**wind, "shelter": {"strength": 0.5}},
+        "full": {**wind, "shelter": {"strength": 1, "wake": 1000}},
+    }
     last = {}
-    for name, effect in [("none", {"velocity": [0, 0, 0]}), ("open", wind), ("half", {**wind, "shelter": {"strength": 0.5}}),
-                         ("full", {**wind, "shelter": {"strength": 1, "wake": 1000}})]:
+    for name, effect in effects.items():
         assert run(program, file, tmp_path / name, *setting("/effects/wind", effect)).returncode == 0
         with h5py.File(tmp_path / name / "tiny.h5") as cache:
             last[name] = cache["position"][-1].reshape(STRANDS, PARTICLES, 3)

@@ -1,15 +1,15 @@
 """The mass-spring model and the scene's own motion through the program."""
+import json
+
 import h5py
 import numpy as np
 import pytest
 
 from conftest import run
-from tiny import LAST, PARTICLES, RADIUS, STRANDS, frame_bytes, write_mesh, write_scene
 from small_cache import ball
+from tiny import LAST, PARTICLES, RADIUS, STRANDS, frame_bytes, write_mesh, write_scene
 
-MASS_SPRING = {"type": "mass_spring"}
-TURN = [0, 0.5, 0, 0.8]
-RIDE = [{"frame": 1}, {"frame": 5, "translate": [0.1, 0, 0], "rotate": TURN}]
+RIDE = [{"frame": 1}, {"frame": 5, "translate": [0.1, 0, 0], "rotate": [0, 0.5, 0, 0.8]}]
 
 
 def steps(program, scene, out, *options):
@@ -28,7 +28,7 @@ def figures(out, name):
 
 @pytest.fixture(scope="module")
 def mass_spring(tmp_path_factory):
-    return write_scene(tmp_path_factory.mktemp("springs"), lambda scene: scene["model"].update(MASS_SPRING))
+    return write_scene(tmp_path_factory.mktemp("springs"), lambda scene: scene["model"].update(type="mass_spring"))
 
 
 @pytest.mark.parametrize("scheme", ["projected", "paper"])
@@ -45,8 +45,6 @@ def test_mass_spring_takes_wind_solids_and_lengths_and_resumes(program, mass_spr
 
 
 def test_the_plan_says_what_companions_take(program, mass_spring):
-    import json
-
     def stages(*options):
         result = run(program, "plan", mass_spring, "--json", *options)
         return {stage["name"]: stage for stage in json.loads(result.stdout)["stages"]}
@@ -66,8 +64,6 @@ def still(tmp_path_factory):
 
 
 def motion(**block):
-    import json
-
     return f"--set=/motion={json.dumps(block)}"
 
 
@@ -79,7 +75,7 @@ def test_no_motion_is_no_motion_bit_for_bit(program, still, tmp_path):
 
 
 def test_a_scene_that_moves_carries_its_head_as_the_heads_own_keys_do(program, still, tmp_path):
-    own = '--set=/head/animation={"keys": ' + str(RIDE).replace("'", '"') + "}"
+    own = f"--set=/head/animation={json.dumps({'keys': RIDE})}"
     assert steps(program, still, tmp_path / "scene", motion(keys=RIDE)) == steps(program, still, tmp_path / "head", own)
 
 

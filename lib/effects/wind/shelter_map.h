@@ -11,7 +11,8 @@ namespace ringlet::effects {
 
 class ShelterMap {
  public:
-  // Draws the mesh as seen along `wind` (not zero) into a grid of square cells, kCells and one along its longer side.
+  // Draws the mesh as seen along `wind` (not zero) into a grid of square cells, kCells and one along its
+  // longer side.
   void draw(std::span<const Vec3> vertices, std::span<const Triangle> triangles, const Vec3& wind);
 
   void reserve();  // all that `draw` will ever hold

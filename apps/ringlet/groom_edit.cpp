@@ -3,13 +3,11 @@
 #include <fmt/ranges.h>
 
 #include <cmath>
-#include <memory>
 
 #include "core/error.h"
 #include "groom/edit.h"
 #include "groom/groom.h"
 #include "groom_files.h"
-#include "solids/mesh.h"
 #include "solids/mesh_distance.h"
 
 namespace ringlet::app {
@@ -91,14 +89,6 @@ scene::Trim trim_of(const GroomTrimOptions& options, double metres) {
   return trim;
 }
 
-groom::SignedDistance cutter_of(const scene::Trim& trim, const scene::Units& units) {
-  if (!trim.mesh) return {};
-  const solids::AnimatedMesh mesh(*trim.mesh, units, {1, 1, 24, 0});
-  const auto distance = std::make_shared<solids::MeshDistance>(trim.mesh->file.string(), mesh.rest_vertices(),
-                                                               mesh.triangles());
-  return [distance](const Vec3& point) { return (*distance)(point); };
-}
-
 scene::Lengthen lengthen_of(const GroomLengthenOptions& options, double metres) {
   check_one_of({{"--by", options.by.has_value()},
                 {"--to", options.to.has_value()},
@@ -158,7 +148,8 @@ int run_groom_trim(const GroomTrimOptions& options) {
   check_output(options.files.output);
   const scene::Trim trim = trim_of(options, metres_in("--unit", options.files.unit));
   const scene::Units units = units_of(options.files);
-  return edit_file(options.files, units, "trim", trim, cutter_of(trim, units));
+  const auto cutter = trim.mesh ? solids::distance_to(*trim.mesh, units) : groom::SignedDistance();
+  return edit_file(options.files, units, "trim", trim, cutter);
 }
 
 int run_groom_lengthen(const GroomLengthenOptions& options) {

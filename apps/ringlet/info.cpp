@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <set>
 
 #include "cache/reader.h"
@@ -116,6 +117,12 @@ Report last_frame_of(const cache::CacheReader& reader, const InfoOptions& option
   if (!frame.velocity.empty()) report["fields"].push_back("velocity");
   if (!frame.elongation.empty()) report["fields"].push_back("elongation");
   if (!frame.surface_vertices.empty()) report["fields"].push_back("solids");
+  if (!frame.living.empty()) {
+    const auto is_hair = [](std::int32_t particles) { return particles > 1; };
+    report["living"] = {
+        {"strands", std::count_if(frame.living.begin(), frame.living.end(), is_hair)},
+        {"particles", std::accumulate(frame.living.begin(), frame.living.end(), std::int64_t{0})}};
+  }
   report["figures"] = json_of(frame.figures);
   if (options.strand)
     report["strand"] = strand_points(options, reader.header().offsets, points_of(frame.position));
@@ -137,6 +144,8 @@ Report describe_cache(const InfoOptions& options) {
   report["particles"] = reader.particles();
   report["particles_per_strand"] = particles_per_strand(header.offsets);
   report["grooms"] = strand_counts(header.groom_of_strand, header.groom_names);
+  if (const auto& followed = header.interpolation; !followed.guides.empty())
+    report["interpolation"] = {{"guides", followed.guides.size()}, {"neighbours", followed.neighbours}};
   report["surfaces"] = Report::object();
   for (const auto& surface : header.surfaces) report["surfaces"][surface.name] = surface.triangles.size() / 3;
   report["frames"] = frames_of(reader);

@@ -2,10 +2,12 @@
 
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <numeric>
 
 #include "core/log.h"
 #include "kernels/solid/surface.h"
+#include "solids/mesh.h"
 
 namespace ringlet::solids {
 namespace {
@@ -75,6 +77,13 @@ double MeshDistance::operator()(const Vec3& point) const {
   kernels::walk(view_, p, closest);
   const double away = std::sqrt(closest.distance2);
   return kernels::winding_number(view_, p) != 0 ? -away : away;
+}
+
+std::function<double(const Vec3&)> distance_to(const scene::MeshDesc& desc, const scene::Units& units) {
+  const AnimatedMesh mesh(desc, units, {1, 1, 24, 0});
+  const auto distance =
+      std::make_shared<MeshDistance>(desc.file.string(), mesh.rest_vertices(), mesh.triangles());
+  return [distance](const Vec3& point) { return (*distance)(point); };
 }
 
 }  // namespace ringlet::solids

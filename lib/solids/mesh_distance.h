@@ -1,10 +1,12 @@
 // How far outside a closed mesh a point is.
 #pragma once
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "kernels/solid/solid_view.h"
+#include "scene/scene_desc.h"
 #include "solids/closest_triangle.h"
 #include "solids/folds.h"
 #include "solids/surface.h"
@@ -32,5 +34,8 @@ class MeshDistance {
   Crossings crossings_;
   kernels::SolidView view_{};
 };
+
+// The same of a mesh file in its rest pose. Throws Error{kInput} for one that cannot be read.
+std::function<double(const Vec3&)> distance_to(const scene::MeshDesc& mesh, const scene::Units& units);
 
 }  // namespace ringlet::solids

@@ -199,6 +199,13 @@ def test_without_grooming_there_is_no_count_and_no_stage(program, scene, plain, 
     assert planned["particles"] == STRANDS * PARTICLES  # those that are there, not the room for more
 
 
+def test_info_counts_what_is_left(program, scene, tmp_path):
+    run_ = Groomed(program, scene, tmp_path / "out", *grooming({"frame": 4, **PLANE}))
+    told = subprocess.run([program, "info", tmp_path / "out", "--json"], capture_output=True, text=True, check=True)
+    left = run_.living[-1]
+    assert json.loads(told.stdout)["last_frame"]["living"] == {"strands": (left > 1).sum(), "particles": left.sum()}
+
+
 def test_a_trim_that_leaves_nothing_names_itself_and_keeps_earlier_frames(program, scene, tmp_path):
     everything = {"frame": 5, "trim": {"sphere": {"centre": [0, 0, 0], "radius": 5}}}
     result = run(program, scene, tmp_path / "out", *grooming({"frame": 3, **PLANE}, everything))

@@ -121,6 +121,11 @@ def test_velocities_of_followers_are_those_of_their_positions(program, scene, tm
     assert np.percentile(np.linalg.norm(moved - velocity, axis=1), 99) < 0.02 * np.percentile(size, 99)
 
 
+def test_info_tells_of_guides(program, both):
+    told = subprocess.run([program, "info", both.filename, "--json"], capture_output=True, text=True, check=True)
+    assert json.loads(told.stdout)["interpolation"] == {"guides": COUNT, "neighbours": 3}
+
+
 @pytest.mark.parametrize("options", [["--threads", "1"], ["--threads", "2"]])
 def test_threads_and_resuming_change_no_byte(program, scene, both, tmp_path, options):
     chosen = [*guides(), *setting("/cache/strands", "both"), *options]

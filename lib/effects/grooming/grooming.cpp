@@ -8,22 +8,9 @@
 
 #include "core/error.h"
 #include "core/log.h"
-#include "solids/mesh.h"
 #include "solids/mesh_distance.h"
 
 namespace ringlet::effects {
-namespace {
-
-groom::SignedDistance cutter_of(const scene::Scene& scene, const scene::GroomingOperation& operation) {
-  const auto* trim = std::get_if<scene::Trim>(&operation.what);
-  if (!trim || !trim->mesh) return {};
-  const solids::AnimatedMesh mesh(*trim->mesh, scene.units, scene.frames);
-  const auto distance = std::make_shared<solids::MeshDistance>(trim->mesh->file.string(),
-                                                               mesh.rest_vertices(), mesh.triangles());
-  return [distance](const Vec3& x) { return (*distance)(x); };
-}
-
-}  // namespace
 
 template <class T>
 Grooming<T>::Grooming(const scene::Scene& scene, std::span<const std::int32_t> groom_of_strand,
@@ -31,8 +18,11 @@ Grooming<T>::Grooming(const scene::Scene& scene, std::span<const std::int32_t> g
     : scene_(scene), groom_of_strand_(groom_of_strand), model_(model), state_(state) {
   for (std::size_t s = 0; s < model_.layout.strands(); ++s)
     spacing_.push_back(groom::spacing(model_.shape(s)));
-  for (const scene::GroomingOperation& operation : scene_.effects.grooming)
-    cutters_.push_back(cutter_of(scene_, operation));
+  for (const scene::GroomingOperation& operation : scene_.effects.grooming) {
+    const auto* trim = std::get_if<scene::Trim>(&operation.what);
+    cutters_.push_back(trim && trim->mesh ? solids::distance_to(*trim->mesh, scene_.units)
+                                          : groom::SignedDistance());
+  }
 }
 
 template <class T>

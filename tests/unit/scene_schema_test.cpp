@@ -1,0 +1,303 @@
+// The schema is the single source of defaults and words: the code's are those.
+#include <gmock/gmock.h>
+
+#include <fstream>
+#include <numbers>
+#include <set>
+#include <variant>
+
+#include "scene/schema_text.h"
+#include "unit/scene_testing.h"
+
+namespace ringlet::scene {
+namespace {
+
+using SceneSchema = SceneTest;
+
+// ---- Defaults
+// ----------------------------------------------------------------------------------------------------
+
+// Pointers of all scalar defaults (and of numbers and words in lists) in the schema.
+void collect_defaults(const Json& node, const std::string& pointer, std::set<std::string>& found) {
+  if (!node.is_structured()) return;
+  for (const auto& [key, inner] : node.items()) {
+    const std::string here = pointer + "/" + key;
+    const bool is_default = key == "default" && node.is_object();
+    if (is_default && !(inner.is_structured() && inner.empty()))
+      found.insert(here);
+    else
+      collect_defaults(inner, here, found);
+  }
+}
+
+struct DefaultCase {
+  std::string in_schema;    // pointer, without its /default
+  std::string in_resolved;  // pointer
+  Json in_struct;
+};
+
+TEST_F(SceneSchema, FillsInExactlyTheSchemasDefaults) {
+  const Scene s = load_json(Json::parse(R"({
+    "name": "defaults", "frames": {"last": 2}, "motion": {"keys": [{"frame": 1}]},
+    "head": {"mesh": "head.obj", "animation": {"keys": [{"frame": 1}]}},
+    "groom": [{"file": "a.hair", "stiffness": [{"curve": [[0, 1]]}]}, {"grow": {"strands_per_triangle": 1}},
+              {"file": "b.hair", "attach": "fixed"},
+              {"name": "few", "grow": {"strands": 5}, "interpolate": {"count": 2}}],
+    "effects": {"grooming": [{"frame": 1, "groom": "b", "trim": {"box": [[0, 0, 0], [1, 1, 1]]}},
+                             {"frame": 1, "groom": "b", "lengthen": {"by": 1}},
+                             {"frame": 1, "groom": "b", "comb": {"curve": [[0, 0, 0], [1, 1, 1]], "radius": 1}}],
+                "inextensible": {}, "non_hookean": {}, "solids": [{"source": "head"}],
+                "wind": {"velocity": [1, 0, 0], "gusts": {}, "turbulence": {}, "shelter": {}}}})"));
+  const Key &key = s.head->animation.keys[0], &carrier = s.head->animation.carrier[0];
+  const Groom& groom = s.grooms[0];
+  const Grow& grow = *s.grooms[1].grow;
+  const Solid& solid = s.effects.solids[0];
+  const Wind& wind = *s.effects.wind;
+  const auto is = [](auto value, auto expected) { return value == expected; };
+  const auto word = [](bool right, const char* name) { return right ? Json(name) : Json("another word"); };
+  const std::string props = "/properties/", defs = "/definitions/", air = "/definitions/wind/properties/";
+  const std::vector<DefaultCase> cases = {
+      {props + "frames/properties/first", "/frames/first", s.frames.first},
+      {props + "frames/properties/fps", "/frames/fps", s.frames.fps},
+      {props + "frames/properties/preroll", "/frames/preroll", s.frames.preroll},
+      {props + "units/properties/length", "/units/length", word(is(s.units.metres_per_unit, 1.0), "m")},
+      {props + "units/properties/up", "/units/up", word(is(s.units.up, Axis::kY), "y")},
+      {props + "effects/properties/collision/properties/iterations", "/effects/collision/iterations",
+       s.effects.collision.iterations},
+      {defs + "non_hookean/properties/memory", "/effects/non_hookean/memory",
+       word(is(s.effects.non_hookean->memory, Memory::kPermanent), "permanent")},
+      {defs + "non_hookean/properties/curve", "/effects/non_hookean/curve", s.effects.non_hookean->curve},
+      {air + "gusts/properties/strength", "/effects/wind/gusts/strength", wind.gusts->strength},
+      {air + "gusts/properties/period", "/effects/wind/gusts/period", wind.gusts->period},
+      {air + "gusts/properties/seed", "/effects/wind/gusts/seed", wind.gusts->seed},
+      {air + "turbulence/properties/strength", "/effects/wind/turbulence/strength",
+       wind.turbulence->strength},
+      {air + "turbulence/properties/scale", "/effects/wind/turbulence/scale", wind.turbulence->scale},
+      {air + "turbulence/properties/octaves", "/effects/wind/turbulence/octaves", wind.turbulence->octaves},
+      {air + "turbulence/properties/seed", "/effects/wind/turbulence/seed", wind.turbulence->seed},
+      {air + "normal_drag/properties/linear", "/effects/wind/normal_drag/linear", wind.normal.linear},
+      {air + "normal_drag/properties/quadratic", "/effects/wind/normal_drag/quadratic",
+       wind.normal.quadratic},
+      {air + "tangential_drag/properties/linear", "/effects/wind/tangential_drag/linear",
+       wind.tangential.linear},
+      {air + "tangential_drag/properties/quadratic", "/effects/wind/tangential_drag/quadratic",
+       wind.tangential.quadratic},
+      {air + "linear_density", "/effects/wind/linear_density", wind.linear_density},
+      {air + "shelter/properties/strength", "/effects/wind/shelter/strength", wind.shelter->strength},
+      {air + "shelter/properties/wake", "/effects/wind/shelter/wake", wind.shelter->wake},
+      {defs + "trim/properties/keep", "/effects/grooming/0/trim/keep",
+       word(!std::get<Trim>(s.effects.grooming[0].what).keep_inside, "outside")},
+      {defs + "lengthen/properties/mode", "/effects/grooming/1/lengthen/mode",
+       word(is(std::get<Lengthen>(s.effects.grooming[1].what).mode, Lengthening::kExtend), "extend")},
+      {defs + "comb/properties/strength", "/effects/grooming/2/comb/strength",
+       std::get<Comb>(s.effects.grooming[2].what).strength},
+      {defs + "interpolate/properties/neighbours", "/groom/3/interpolate/neighbours",
+       s.grooms[3].interpolate->neighbours},
+      {props + "limits/properties/edge_strain", "/limits/edge_strain", s.limits.edge_strain},
+      {props + "limits/properties/speed", "/limits/speed", s.limits.speed},
+      {props + "cache/properties/fields", "/cache/fields", s.cache.fields},
+      {props + "cache/properties/strands", "/cache/strands",
+       word(is(s.cache.strands, StoredStrands::kAll), "all")},
+      {props + "cache/properties/compression", "/cache/compression",
+       word(is(s.cache.compression, Compression::kDefault), "default")},
+      {props + "cache/properties/error", "/cache/error", s.cache.error},
+      {props + "motion/properties/interpolation", "/motion/interpolation",
+       word(is(s.head->animation.carrier_interpolation, Interpolation::kSmooth), "smooth")},
+      {props + "motion/properties/speed", "/motion/speed", s.head->animation.speed},
+      {props + "motion/properties/keys/items/properties/translate",
+       "/motion/keys/0/translate",
+       {carrier.translate.x(), carrier.translate.y(), carrier.translate.z()}},
+      {props + "motion/properties/keys/items/properties/rotate",
+       "/motion/keys/0/rotate",
+       {carrier.rotate.x(), carrier.rotate.y(), carrier.rotate.z(), carrier.rotate.w()}},
+      {defs + "key/properties/translate",
+       "/head/animation/keys/0/translate",
+       {key.translate.x(), key.translate.y(), key.translate.z()}},
+      {defs + "key/properties/rotate",
+       "/head/animation/keys/0/rotate",
+       {key.rotate.x(), key.rotate.y(), key.rotate.z(), key.rotate.w()}},
+      {defs + "key/properties/scale", "/head/animation/keys/0/scale", key.scale},
+      {defs + "mesh_animation/properties/loop", "/head/animation/loop", s.head->animation.loop},
+      {defs + "mesh_animation/properties/interpolation", "/head/animation/interpolation",
+       word(is(s.head->animation.interpolation, Interpolation::kSmooth), "smooth")},
+      {defs + "groom_animation/properties/interpolation", "/groom/0/animation/interpolation",
+       word(is(groom.animation.interpolation, Interpolation::kSmooth), "smooth")},
+      {defs + "groom/properties/attach", "/groom/0/attach",
+       word(is(groom.attach, Attach::kNearest), "nearest")},
+      {defs + "groom/properties/attach_distance", "/groom/0/attach_distance", groom.attach_distance},
+      {defs + "groom/properties/root_offset", "/groom/0/root_offset",
+       word(is(groom.root_offset, RootOffset::kKeep), "keep")},
+      {defs + "groom/properties/penetration", "/groom/0/penetration",
+       word(is(groom.penetration, Penetration::kPushOut), "push_out")},
+      {defs + "groom/then/properties/name", "/groom/1/name", s.grooms[1].name},
+      {defs + "groom/else/properties/width", "/groom/0/width", groom.width},
+      {defs + "stiffness_scale/properties/group", "/groom/0/stiffness/0/group", groom.stiffness[0].group},
+      {defs + "stiffness_scale/properties/coupling", "/groom/0/stiffness/0/coupling",
+       groom.stiffness[0].coupling},
+      {defs + "grow/properties/scalp/properties/max_angle_degrees", "/groom/1/grow/scalp/max_angle_degrees",
+       grow.scalp.max_angle * 180 / std::numbers::pi},
+      {defs + "grow/properties/strands_per_triangle", "/groom/3/grow/strands_per_triangle",
+       s.grooms[3].grow->strands_per_triangle},
+      {defs + "grow/properties/strands", "/groom/1/grow/strands", grow.strands},
+      {defs + "grow/properties/seed", "/groom/1/grow/seed", grow.seed},
+      {defs + "grow/properties/particles", "/groom/1/grow/particles", grow.particles},
+      {defs + "grow/properties/step", "/groom/1/grow/step", grow.step},
+      {defs + "grow/properties/length_variation", "/groom/1/grow/length_variation", grow.length_variation},
+      {defs + "grow/properties/direction_noise", "/groom/1/grow/direction_noise", grow.direction_noise},
+      {defs + "grow/properties/gravity_influence", "/groom/1/grow/gravity_influence", grow.gravity_influence},
+      {defs + "grow/properties/max_deviation", "/groom/1/grow/max_deviation", grow.max_deviation},
+      {defs + "grow/properties/helix_radius", "/groom/1/grow/helix_radius", grow.helix_radius},
+      {defs + "grow/properties/helix_frequency", "/groom/1/grow/helix_frequency", grow.helix_frequency},
+      {defs + "grow/properties/helix_impact", "/groom/1/grow/helix_impact", grow.helix_impact},
+      {defs + "grow/properties/width", "/groom/1/grow/width", grow.width},
+      {defs + "model/properties/type", "/model/type", word(is(s.model.type, ModelType::kAms), "ams")},
+      {defs + "model/properties/scheme", "/model/scheme",
+       word(is(s.model.scheme, Scheme::kProjected), "projected")},
+      {defs + "model/properties/stiffness/properties/edge", "/model/stiffness/edge", s.model.stiffness.edge},
+      {defs + "model/properties/stiffness/properties/bend", "/model/stiffness/bend", s.model.stiffness.bend},
+      {defs + "model/properties/stiffness/properties/twist", "/model/stiffness/twist",
+       s.model.stiffness.twist},
+      {defs + "model/properties/stiffness/properties/integrity", "/model/stiffness/integrity",
+       s.model.stiffness.integrity},
+      {defs + "model/properties/stiffness/properties/angular", "/model/stiffness/angular",
+       s.model.stiffness.angular},
+      {defs + "model/properties/particle_mass", "/model/particle_mass", s.model.particle_mass},
+      {defs + "model/properties/substeps", "/model/substeps", s.model.substeps},
+      {defs + "model/properties/drag", "/model/drag", s.model.drag},
+      {defs + "model/properties/clamped_particles", "/model/clamped_particles", s.model.clamped_particles},
+      {defs + "model/properties/preload", "/model/preload", s.model.preload},
+      {defs + "model/else/properties/geometric_stiffness", "/model/geometric_stiffness",
+       s.model.geometric_stiffness},
+      {defs + "model/else/properties/material_damping", "/model/material_damping", s.model.material_damping},
+      {defs + "model/else/properties/angular_tangent", "/model/angular_tangent",
+       word(is(s.model.angular_tangent, AngularTangent::kConsistent), "consistent")},
+      {defs + "model/else/properties/integrity_tangent", "/model/integrity_tangent",
+       word(is(s.model.integrity_tangent, IntegrityTangent::kExact), "exact")},
+      {defs + "inextensible/properties/tolerance", "/effects/inextensible/tolerance",
+       s.effects.inextensible->tolerance},
+      {defs + "inextensible/properties/max_iterations", "/effects/inextensible/max_iterations",
+       s.effects.inextensible->max_iterations},
+      {defs + "inextensible/properties/per", "/effects/inextensible/per",
+       word(is(s.effects.inextensible->cadence, Cadence::kSubstep), "substep")},
+      {defs + "solid/properties/friction", "/effects/solids/0/friction", solid.friction},
+      {defs + "solid/properties/offset", "/effects/solids/0/offset", solid.offset},
+      {defs + "solid/properties/resolution", "/effects/solids/0/resolution", solid.resolution},
+      {defs + "solid/properties/half_width", "/effects/solids/0/half_width", solid.half_width},
+  };
+  const Json schema = Json::parse(schema_text());
+  const Json resolved = Json::parse(s.resolved);
+  std::set<std::string> in_schema, tested;
+  collect_defaults(schema, "", in_schema);
+  for (const DefaultCase& c : cases) {
+    const Json& value = schema[Json::json_pointer(c.in_schema + "/default")];
+    EXPECT_EQ(resolved.at(Json::json_pointer(c.in_resolved)), value) << c.in_schema;
+    EXPECT_EQ(c.in_struct, value) << c.in_schema;
+    tested.insert(c.in_schema + "/default");
+  }
+  for (const char* name : {"geometric_stiffness", "material_damping", "angular_tangent", "integrity_tangent"})
+    tested.insert(defs + "model/then/properties/" + name + "/default");  // below
+  EXPECT_EQ(tested, in_schema) << "a default without a test, or a test without a default";
+}
+
+TEST_F(SceneSchema, TakesThePapersVariantsFromItsScheme) {
+  const Json variants = Json::parse(schema_text())["definitions"]["model"]["then"]["properties"];
+  const Scene paper = load_json(minimal(), {"/model/scheme=\"paper\""});
+  const Json resolved = Json::parse(paper.resolved)["model"];
+  EXPECT_EQ(resolved["geometric_stiffness"], variants["geometric_stiffness"]["default"]);
+  EXPECT_EQ(resolved["material_damping"], variants["material_damping"]["default"]);
+  EXPECT_EQ(resolved["angular_tangent"], variants["angular_tangent"]["default"]);
+  EXPECT_EQ(resolved["integrity_tangent"], variants["integrity_tangent"]["default"]);
+  EXPECT_EQ(paper.model.scheme, Scheme::kPaper);
+  EXPECT_FALSE(paper.model.geometric_stiffness);
+  EXPECT_EQ(paper.model.material_damping, 0);
+  EXPECT_EQ(paper.model.angular_tangent, AngularTangent::kPaper);
+  EXPECT_EQ(paper.model.integrity_tangent, IntegrityTangent::kPaper);
+  EXPECT_TRUE(paper.model.preload) << "stays on";
+
+  const Scene own = load_json(minimal(), {"/model/scheme=\"paper\"", "/model/material_damping=0.01",
+                                          "/model/integrity_tangent=\"exact\""});
+  EXPECT_EQ(own.model.material_damping, 0.01) << "what the scene says wins";
+  EXPECT_EQ(own.model.integrity_tangent, IntegrityTangent::kExact);
+  EXPECT_FALSE(own.model.geometric_stiffness);
+}
+
+// ---- The schema itself
+// -------------------------------------------------------------------------------------------
+
+// Calls visit(node, pointer) for each schema that describes a value (not those of if/then/else's conditions).
+template <class Visit>
+void each_value_schema(const Json& node, const std::string& pointer, const Visit& visit) {
+  if (!node.is_object()) return;
+  visit(node, pointer);
+  if (node.contains("properties"))
+    for (const auto& [key, inner] : node["properties"].items())
+      each_value_schema(inner, pointer + "/properties/" + key, visit);
+  if (node.contains("items")) each_value_schema(node["items"], pointer + "/items", visit);
+  if (node.contains("definitions"))
+    for (const auto& [key, inner] : node["definitions"].items())
+      each_value_schema(inner, pointer + "/definitions/" + key, visit);
+  if (node.contains("properties") || !node.contains("if")) return;
+  for (const char* branch : {"then", "else"})
+    if (node.contains(branch)) each_value_schema(node[branch], pointer + "/" + branch, visit);
+}
+
+TEST_F(SceneSchema, IsTheOneInTheRepository) {
+  std::ifstream stream(RINGLET_SOURCE_DIR "/schemas/scene.schema.json");
+  EXPECT_EQ(std::string(std::istreambuf_iterator<char>(stream), {}), schema_text());
+}
+
+TEST_F(SceneSchema, IsClosedDescribedAndHasUnits) {
+  each_value_schema(Json::parse(schema_text()), "", [](const Json& node, const std::string& pointer) {
+    const std::string type = node.value("type", "");
+    if (type == "number") {
+      EXPECT_TRUE(node.contains("unit")) << pointer;
+    }
+    if (type == "integer") {
+      EXPECT_TRUE(node.contains("minimum") && node.contains("maximum")) << pointer;
+    }
+    if (type == "array") {
+      EXPECT_TRUE(node["items"].is_object()) << pointer;
+    }
+    if (type != "object") return;
+    EXPECT_EQ(node.value("additionalProperties", true), false) << pointer;
+    for (const auto& [key, inner] : node["properties"].items()) {
+      EXPECT_TRUE(inner.contains("description") || inner.contains("$ref"))
+          << pointer << "/properties/" << key;
+    }
+  });
+}
+
+TEST_F(SceneSchema, KnowsEveryWordOfTheSchema) {
+  const Json schema = Json::parse(schema_text());
+  const std::tuple<const char*, const char*> words[] = {
+      {"/definitions/axis/enum", "/units/up"},
+      {"/definitions/length_unit/then/enum", "/units/length"},
+      {"/definitions/interpolation/enum", "/head/animation/interpolation"},
+      {"/definitions/groom/properties/attach/enum", "/groom/0/attach"},
+      {"/definitions/groom/properties/root_offset/enum", "/groom/0/root_offset"},
+      {"/definitions/groom/properties/penetration/enum", "/groom/0/penetration"},
+      {"/definitions/stiffness_scale/properties/coupling/enum", "/groom/0/stiffness/0/coupling"},
+      {"/definitions/model/properties/scheme/enum", "/model/scheme"},
+      {"/definitions/model/properties/angular_tangent/enum", "/model/angular_tangent"},
+      {"/definitions/model/properties/integrity_tangent/enum", "/model/integrity_tangent"},
+      {"/definitions/inextensible/properties/per/enum", "/effects/inextensible/per"},
+      {"/definitions/non_hookean/properties/memory/enum", "/effects/non_hookean/memory"},
+      {"/definitions/trim/properties/keep/enum", "/effects/grooming/1/trim/keep"},
+      {"/definitions/lengthen/properties/mode/enum", "/effects/grooming/7/lengthen/mode"},
+      {"/properties/cache/properties/strands/enum", "/cache/strands"},
+      {"/properties/cache/properties/compression/enum", "/cache/compression"},
+  };
+  for (const auto& [in_schema, in_scene] : words)
+    for (const Json& word : schema.at(Json::json_pointer(in_schema)))
+      EXPECT_NO_THROW(load_json(full(), {std::string(in_scene) + "=" + word.dump()})) << in_scene << word;
+  for (const Json& word : schema.at("/definitions/model/properties/type/enum"_json_pointer))
+    EXPECT_NO_THROW(load_json(minimal(), {"/model/type=" + word.dump()}))
+        << "full() softens, which ams alone does";
+  std::size_t enums = 0;
+  each_value_schema(schema, "",
+                    [&](const Json& node, const std::string&) { enums += node.contains("enum"); });
+  EXPECT_EQ(enums, std::size(words) + 2) << "all but cache.fields, which stay words, and model.type";
+}
+
+}  // namespace
+}  // namespace ringlet::scene

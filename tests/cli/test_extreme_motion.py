@@ -1,5 +1,5 @@
 """Motion at 1, 3 and 10 times its speed: the roller-coaster (at ten times 600 g and 190 m/s) and the default scene's
-head, which turns to and fro. Runs end, lengths and speeds stay bounded, the hair comes to rest once the motion stops."""
+head, which turns to and fro. Runs end, lengths and speeds stay bounded, hair comes to rest once the motion stops."""
 import json
 
 import numpy as np
@@ -14,7 +14,7 @@ STRANDS = {RIDE: 75, TURN: 120}
 AFTER = {RIDE: 216, TURN: 120}  # frames after the motion's end; torn hair swings freely, its speed halves in 2 s
 MODELS = {"ams": {}, "paper": {"/model/scheme": "paper"}, "mass_spring": {"/model/type": "mass_spring"}}
 
-STRAIN = 1e-3  # of any segment at a frame's end: measured 2e-4 (ams, where solids move it) to 8e-4 (paper and mass springs)
+STRAIN = 1e-3  # of any segment at a frame's end: measured 2e-4 with ams, 8e-4 with the other two
 
 
 @pytest.fixture(scope="module")

@@ -1,5 +1,5 @@
-"""What the paper's figures 4, 5, 9 and 10 compare, in reduced form: the rest shape kept by AMS and lost by mass springs,
-calm with and without the angular coupling, damage that stays; each in both schemes."""
+"""What the paper's figures 4, 5, 9 and 10 compare, in reduced form: the rest shape kept by AMS and lost by mass
+springs, calm with and without the angular coupling, damage that stays; each in both schemes."""
 import subprocess
 import sys
 
@@ -93,7 +93,8 @@ def test_angular_coupling_is_what_holds_the_papers_scheme_together(figures):
     assert strains[0] < 0.1 < 0.2 < strains[1] < 1 < strains[2]
     assert max(each["edge_strain_max"] for each in projected) < 0.05
     assert paper[2]["speed_rms_last_second"] > 0.3 > 0.05 > projected[2]["speed_rms_last_second"]
-    assert projected[2]["tip_deviation_mean_end"] > 0.2 > 0.02 > projected[0]["tip_deviation_mean_end"]  # the shape goes
+    tips = [each["tip_deviation_mean_end"] for each in projected]  # the shape is lost all the same
+    assert tips[0] < 0.02 < 0.15 < tips[2]
 
 
 # ---- Figure 9: beard ------------------------------------------------------------------------------------------------
@@ -164,9 +165,9 @@ def test_permanent_damage_shows_after_the_ride_and_reversible_does_not(figures, 
 
 
 def test_strands_and_ride_are_what_the_tools_make(tmp_path):
-    subprocess.run([sys.executable, SOURCE / "tools/make-paper-strands", "-o", tmp_path], check=True, capture_output=True)
+    made = tmp_path / "roller_coaster.json"
+    for tool, output in (("make-paper-strands", tmp_path), ("make-roller-coaster", made)):
+        subprocess.run([sys.executable, SOURCE / "tools" / tool, "-o", output], check=True, capture_output=True)
     for name in ("helix.data", "wisp.data"):
         assert (tmp_path / name).read_bytes() == (SCENES / "assets" / name).read_bytes()
-    made = tmp_path / "roller_coaster.json"
-    subprocess.run([sys.executable, SOURCE / "tools/make-roller-coaster", "-o", made], check=True, capture_output=True)
     assert made.read_text() == (SCENES / "roller_coaster.json").read_text()

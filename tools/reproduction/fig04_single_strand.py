@@ -16,7 +16,12 @@ WAYS = {
 FPS = 12  # written; steps a second are a multiple
 SECONDS = 20  # long enough for a strand that is damped at all to hang still
 GAIN = 2  # of energy, beyond which a run has made it up: companions can hand the hair as much again as it released
-SHAKE = [{"frame": 7}, {"frame": 10, "translate": [0, 0.05, 0]}, {"frame": 13, "translate": [0, -0.05, 0]}, {"frame": 16}]
+SHAKE = [
+    {"frame": 7},
+    {"frame": 10, "translate": [0, 0.05, 0]},
+    {"frame": 13, "translate": [0, -0.05, 0]},
+    {"frame": 16},
+]
 
 
 def run(figures, model, scheme, stiffness, steps=60, precision="float", label="", **more):
@@ -29,8 +34,8 @@ def run(figures, model, scheme, stiffness, steps=60, precision="float", label=""
 
 
 def history(run):
-    """Of each frame: largest distance from the rest shape over the strand's length, root mean square speed [m/s], and per
-    unit mass what the hair moves with, its segments hold and gravity has given [J/kg]."""
+    """Of each frame: largest distance from the rest shape over the strand's length; root mean square speed [m/s]; and
+    per unit mass the energy that the hair moves with and its segments hold, and what gravity has given [J/kg]."""
     stiffness = run.scene["model"]["stiffness"]["edge"]
     rest, length = run.cache.rest_position.astype(float), run.rest_lengths
     names, rows = ("deviation", "speed", "held", "released"), []
@@ -93,9 +98,9 @@ def variants(figures):
 def strands(figures):
     """The strands after 4 s, drawn three times as wide: AMS, then mass springs by their stiffness."""
     frame = 1 + 4 * FPS
+    shown = {"AMS 1e7": ("ams", 1e7)} | {f"MS 1e{np.log10(each):.0f}": ("mass_spring", each) for each in SHOWN}
     rows = [
-        [("AMS 1e7", run(figures, "ams", scheme, 1e7))]
-        + [(f"MS {stiffness:.0e}".replace("+0", ""), run(figures, "mass_spring", scheme, stiffness)) for stiffness in SHOWN]
+        [(label, run(figures, model, scheme, stiffness)) for label, (model, stiffness) in shown.items()]
         for scheme in SCHEMES
     ]
     for _, one in sum(rows, []):

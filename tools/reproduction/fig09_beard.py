@@ -46,5 +46,8 @@ def make(figures):
 
     pictures.plot(figures.path("_plot.png"), draw)
     figures.record(
-        {f"{model}, {scheme}": {"shape": shape(one), "health": one.health(FRAMES[1:])} for (model, scheme), one in runs.items()}
+        {
+            f"{model}, {scheme}": {"shape": shape(one), "health": one.health(FRAMES[1:])}
+            for (model, scheme), one in runs.items()
+        }
     )

@@ -49,8 +49,8 @@ def ride(figures, variant, scheme, strands=FEW):
 
 
 def residual(one):
-    """What is left of the style: deviation in the last frame over strand length, how still the hair is, and the share of
-    particles that went beyond the transition and the break of the curve during the ride."""
+    """What is left of the style: deviation in the last frame over strand length, how still the hair is, and the share
+    of particles that went beyond the transition and the break of the curve during the ride."""
     farthest = np.max([one.deviation(frame) for frame in one.frames], axis=0)
     away = one.deviation(one.frames[-1])
     return {

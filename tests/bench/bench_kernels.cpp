@@ -49,17 +49,26 @@ const Wig& wig() {
 }
 
 enum class Motion { kStill, kShaken };
+enum class Extra { kNone, kAir, kElongation, kMassSpring };
+
+inline state::StrandInput input_for(Extra extra) {
+  state::StrandInput input = wig().input;
+  input.elongation = extra == Extra::kElongation, input.companions = extra == Extra::kMassSpring;
+  return input;
+}
 
 template <class T>
 struct Bench {
-  state::StrandModel<T> model{wig().input};
+  state::StrandModel<T> model;
   state::StrandState<T> state{model};
   state::AlignedVector<T> figures, scratch;
   kernels::StrandParameters<T> parameters{};
   std::vector<Pose> pose = wig().roots;
+  kernels::Elongation<T> elongation{};
+  kernels::Air<T> air{};
   int steps = 0;
 
-  Bench() {
+  explicit Bench(Extra extra = Extra::kNone) : model(input_for(extra)) {
     state::pose_at_rest<T>(state, model, pose);
     figures.assign(static_cast<std::size_t>(model.layout.batches()) * kernels::kFigures * kLanes, T(0));
     scratch.assign(kernels::scratch_reals(model.layout.longest()), T(0));
@@ -70,6 +79,15 @@ struct Bench {
     parameters.consistent_angular = parameters.exact_integrity = true;
     parameters.clamped = 1, parameters.length_tolerance = T(1e-4);
     parameters.strain_limit = parameters.speed_limit = T(1e6);
+    if (extra == Extra::kElongation) {
+      state.elongation.assign(state.position.size() / 3, T(0));
+      elongation = {
+          state.elongation.data(), {1, T(0.5), T(1), {T(0.5)}, {{T(0.5), T(1), T(-1), T(0)}}}, true};
+    }
+    if (extra == Extra::kAir) {
+      state.air.assign(state.position.size(), T(1));
+      air = {state.air.data(), {T(46), T(9.6)}, {T(22), T(0.1)}};
+    }
   }
 
   // Roots to where they are after one more step: at rest, or shaken violently by 0.3 m at 3 Hz.
@@ -86,7 +104,13 @@ struct Bench {
   }
   void strand_step(InstructionSet set) {
     kernels::cpu_kernels<T>(set).strand_step(
-        {model.view(), state.view(), state.root_motion.data(), parameters, figures.data()}, 0,
+        {model.view(), state.view(), state.root_motion.data(), parameters, figures.data(), elongation, air},
+        0, model.layout.batches(), scratch.data());
+  }
+  void wind_step(InstructionSet set, const kernels::WindField<T>& field) {
+    state.air.resize(state.position.size());
+    kernels::cpu_kernels<T>(set).wind_step(
+        {model.view(), state.position.data(), state.root_points.data(), field, nullptr, state.air.data()}, 0,
         model.layout.batches(), scratch.data());
   }
   double mean_figure(kernels::StrandFigure which) const {
@@ -103,9 +127,10 @@ void report(benchmark::State& run) {
 }
 
 template <class T>
-void strand_step(benchmark::State& run, InstructionSet set, Motion motion, int length_iterations) {
+void strand_step(benchmark::State& run, InstructionSet set, Motion motion, int length_iterations,
+                 Extra extra) {
   if (set > kernels::best_instruction_set()) return run.SkipWithError("not on this processor");
-  Bench<T> bench;
+  Bench<T> bench(extra);
   bench.parameters.length_iterations = length_iterations;
   double iterations = 0, pieces = 0;
   for (int k = 0; k < 24; ++k) bench.move_roots(motion), bench.strand_step(set);
@@ -120,6 +145,19 @@ void strand_step(benchmark::State& run, InstructionSet set, Motion motion, int l
   report(run);
   run.counters["length_iterations"] = iterations / run.iterations();
   run.counters["pieces"] = pieces / run.iterations();
+}
+
+// The default turbulence, 3 octaves of 8 waves.
+template <class T>
+void wind_step(benchmark::State& run, InstructionSet set) {
+  if (set > kernels::best_instruction_set()) return run.SkipWithError("not on this processor");
+  Bench<T> bench;
+  kernels::WindField<T> field{};
+  field.modes = 24;
+  for (int n = 0; n < field.modes; ++n)
+    field.wave[n][0] = T(1 + n), field.amplitude[n][1] = T(0.1), field.phase[n] = T(0.01 * n);
+  for (auto _ : run) bench.wind_step(set, field);
+  report(run);
 }
 
 // One contact stage from the same state again and again; the sphere at the strands' roots, or far from all.
@@ -163,10 +201,14 @@ void register_all() {
           ->Unit(benchmark::kMillisecond)
           ->MinTime(0.3);
     };
-    add("strand_step/float/shaken", strand_step<float>, Motion::kShaken, 8);
-    add("strand_step/float/still", strand_step<float>, Motion::kStill, 8);
-    add("strand_step/float/no_projection", strand_step<float>, Motion::kShaken, 0);
-    add("strand_step/double/shaken", strand_step<double>, Motion::kShaken, 8);
+    add("strand_step/float/shaken", strand_step<float>, Motion::kShaken, 8, Extra::kNone);
+    add("strand_step/float/still", strand_step<float>, Motion::kStill, 8, Extra::kNone);
+    add("strand_step/float/no_projection", strand_step<float>, Motion::kShaken, 0, Extra::kNone);
+    add("strand_step/float/still/air", strand_step<float>, Motion::kStill, 8, Extra::kAir);
+    add("strand_step/float/still/elongation", strand_step<float>, Motion::kStill, 8, Extra::kElongation);
+    add("strand_step/float/still/mass_spring", strand_step<float>, Motion::kStill, 8, Extra::kMassSpring);
+    add("strand_step/double/shaken", strand_step<double>, Motion::kShaken, 8, Extra::kNone);
+    add("wind_step/float", wind_step<float>);
     add("contact_step/float/far", contact_step<float>, false);
     add("contact_step/float/near", contact_step<float>, true);
   }

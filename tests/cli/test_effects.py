@@ -39,7 +39,10 @@ def plan(program, scene, *options):
     return {stage["name"]: stage for stage in json.loads(result.stdout)["stages"]}
 
 
-@pytest.mark.parametrize("wind", [{"velocity": [0, 0, 0]}, {"velocity": [0, 0, 0], "turbulence": {}, "shelter": {}}])
+@pytest.mark.parametrize("wind", [
+    {"velocity": [0, 0, 0]}, {"velocity": [0, 0, 0], "turbulence": {}, "shelter": {}},
+    {"velocity": [1, 0, 0], "keys": [{"frame": 1, "velocity": [-1, 0, 0]}], "gusts": {}},
+])
 def test_a_wind_of_zero_is_no_wind_bit_for_bit(program, scene, plain, tmp_path, wind):
     still = setting("/effects/wind", wind)
     assert plan(program, scene, *still) == plan(program, scene)

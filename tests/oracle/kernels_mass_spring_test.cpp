@@ -75,6 +75,22 @@ TEST(Altitude, OfPointsOnALineOrOnOnePointIsNone) {
   }
 }
 
+TEST(Altitude, OfAFlatTetrahedronIsNothingAndOfAnInvertedOneNegative) {
+  using V = kernels::Vector3<double>;
+  const V rest[4] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0.2, 0.2, 0.5}};
+  V flat[4], inverted[4];
+  for (int k = 0; k < 4; ++k)
+    flat[k] = {rest[k].x, rest[k].y, 0}, inverted[k] = {rest[k].x, rest[k].y, -rest[k].z};
+  const kernels::Altitude<double> whole = kernels::shortest_altitude(rest, rest),
+                                  none = kernels::shortest_altitude(flat, rest),
+                                  turned = kernels::shortest_altitude(inverted, rest);
+  EXPECT_DOUBLE_EQ(whole.length, whole.rest_length);
+  EXPECT_EQ(none.length, 0);
+  EXPECT_NEAR(std::abs(none.normal.z), 1, 1e-15);  // so that its spring lifts it out of the plane
+  EXPECT_GT(std::abs(none.rest_length), 0.3);
+  EXPECT_DOUBLE_EQ(turned.length, -turned.rest_length);
+}
+
 // The reference's force is minus its energy's gradient, the choice of altitudes held.
 TEST(MassSpringReference, ForceIsTheGradientOfItsEnergy) {
   std::mt19937 generator(5);
@@ -221,10 +237,13 @@ TYPED_TEST(KernelMassSpring, SolvesTheReferencesSystemInAWind) {
   for (int count = 1; count <= 33; ++count) this->expect_reference(generator, count, &kHairInAir);
 }
 
-// Rest is rest, by either scheme, for 4 seconds.
+// Rest is rest, by either scheme, curled and straight, for 4 seconds.
 TYPED_TEST(KernelMassSpring, StaysAtRestWithoutWeight) {
-  for (const bool paper : {false, true}) {
+  for (const auto& [paper, straight] :
+       {std::pair(false, false), {true, false}, {false, true}, {true, true}}) {
     oracle::Strand strand = this->helix(paper);
+    if (straight) strand.rest.bottomRows(2).setZero();
+    strand = rounded<typename TypeParam::T>(strand);
     strand.gravity.setZero();
     StrandRun<TypeParam> run({strand}, {RootPose{}}, false, Springs::kMassSpring);
     const oracle::State start = run.get_chain();

@@ -31,6 +31,21 @@ using SignedDistance = std::function<double(const Vec3&)>;
 
 // Does `operation` to a strand; true where that changed it. `cutter`: the distance to the mesh of a trim by
 // mesh. Prescribed particles (the root) stay. A strand whose root is cut away keeps its root alone.
+//
+// Trim: the tip comes to lie on the cut; where that would leave a last segment under a tenth of what it was,
+// the strand ends a particle sooner, so much short. A mesh is followed to a micrometre; sheets of it thinner
+// than ten may be missed.
+//
+// Lengthen, extend: the last segment first grows to the others' length, in its direction, so that a strand
+// that was trimmed gets its old shape back. Then come new particles, with the curl of the strand's end
+// (continuation.h): a helix goes on as that helix, an arc as that arc. What is left over is a shorter segment
+// or, under a tenth of one, goes to the last. New particles have the tip's velocity. A strand of one particle
+// has no direction and stays.
+//
+// Comb: what is combed is the present shape, and it becomes the rest shape, with the rest shape's lengths.
+// Segment after segment turns towards the point of the curve that lies its own length ahead, and carries what
+// follows, so that curls out of reach are not flattened. Past its end the curve goes straight on, but has no
+// reach there.
 bool edit(EditedStrand& strand, const scene::GroomingOperation& operation, const SignedDistance& cutter = {});
 
 // The most particles that a strand of `rest` can come to have by `operations`, whatever its position, with

@@ -1,13 +1,12 @@
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 
+#include "groom/continuation.h"
 #include "groom/edit_operations.h"
 
 namespace ringlet::groom {
 namespace {
 
-constexpr std::size_t kTail = 8;    // last segments that tell how the strand goes on
 constexpr double kRounding = 1e-9;  // of a strand: a length this little short is there
 
 double length_of(std::span<const Vec3> points) {
@@ -20,31 +19,6 @@ double missing_length(const scene::Lengthen& by, double length) {
   if (by.by) return *by.by;
   if (by.to) return std::max(0.0, *by.to - length);
   return (*by.factor - 1) * length;
-}
-
-// ---- How a strand goes on --------------------------------------------------------------------------
-
-std::vector<Vec3> directions_of(std::span<const Vec3> points) {
-  std::vector<Vec3> directions;
-  for (std::size_t i = 0; i + 1 < points.size(); ++i) {
-    const Vec3 segment = points[i + 1] - points[i];
-    const double length = segment.norm();
-    if (length > 0) directions.push_back(segment / length);
-  }
-  return directions;
-}
-
-// The rotation that best takes each direction to the next (Kabsch 1976). A helix has one that does exactly.
-Mat3 turn_per_segment(const std::vector<Vec3>& directions) {
-  if (directions.size() < 2) return Mat3::Identity();
-  if (directions.size() == 2) return Quat::FromTwoVectors(directions[0], directions[1]).toRotationMatrix();
-  Mat3 products = Mat3::Zero();
-  for (std::size_t i = 0; i + 1 < directions.size(); ++i)
-    products += directions[i + 1] * directions[i].transpose();
-  const Eigen::JacobiSVD<Mat3> svd(products, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Mat3 &u = svd.matrixU(), &v = svd.matrixV();
-  const double handed = u.determinant() * v.determinant() < 0 ? -1 : 1;
-  return u * Vec3(1, 1, handed).asDiagonal() * v.transpose();
 }
 
 // The rotation of the root's frame carried up to the tip, each segment turning the least that takes it from
@@ -85,30 +59,31 @@ Extension divide(double length, double last_segment, double spacing) {
   return extension;
 }
 
-void extend(EditedStrand& strand, double length) {
-  std::vector<Vec3>&rest = strand.rest, &position = strand.position;
-  const std::span<const Vec3> tail = std::span<const Vec3>(rest).last(std::min(rest.size(), kTail + 1));
-  const std::vector<Vec3> directions = directions_of(tail);
-  if (directions.empty()) return;
-  const double step = std::max(strand.spacing, spacing(rest));
-  Eigen::AngleAxisd turn(turn_per_segment(directions));
-  turn.angle() *= step / spacing(tail);
-  const Mat3 turn_per_step = turn.toRotationMatrix(), rest_to_now = rotation_at_tip(strand);
+// The last segment grows in its own direction, now as at rest.
+void grow_last(EditedStrand& strand, double length, const Mat3& rest_to_now) {
+  const std::size_t tip = strand.rest.size() - 1;
+  std::size_t before = tip - 1;
+  while (before > 0 && strand.rest[before] == strand.rest[tip]) --before;
+  const Vec3 along = (strand.rest[tip] - strand.rest[before]).normalized();
+  const Vec3 now = strand.position[tip] - strand.position[before];
+  strand.rest[tip] += length * along;
+  strand.position[tip] += length * (now.norm() > 0 ? Vec3(now.normalized()) : Vec3(rest_to_now * along));
+}
 
-  const std::size_t tip = rest.size() - 1;
-  const double last_segment = (rest[tip] - rest[tip - 1]).norm();
-  const Extension extension = divide(length, last_segment, step);
-  Vec3 direction = directions.back();
-  rest[tip] += extension.old_tip * direction;
-  const double stretch = last_segment > 0 ? extension.old_tip / last_segment : 0;
-  position[tip] += stretch * (position[tip] - position[tip - 1]);
+void extend(EditedStrand& strand, double length) {
+  const double step = std::max(strand.spacing, spacing(strand.rest));
+  const std::size_t tip = strand.rest.size() - 1;
+  const Extension extension = divide(length, (strand.rest[tip] - strand.rest[tip - 1]).norm(), step);
+  const Mat3 rest_to_now = rotation_at_tip(strand);
+  if (extension.old_tip > 0) grow_last(strand, extension.old_tip, rest_to_now);
+  if (extension.added == 0) return;
+  Continuation continuation(strand.rest, step);
   for (std::size_t i = 1; i <= extension.added; ++i) {
-    direction = (turn_per_step * direction).normalized();
-    const Vec3 segment = (i < extension.added ? step : extension.last) * direction;
-    rest.push_back(rest.back() + segment);
-    position.push_back(position.back() + rest_to_now * segment);
+    const Vec3 segment = (i < extension.added ? step : extension.last) * continuation.next();
+    strand.rest.push_back(strand.rest.back() + segment);
+    strand.position.push_back(strand.position.back() + rest_to_now * segment);
   }
-  strand.velocity.resize(rest.size(), strand.velocity[tip]);
+  strand.velocity.resize(strand.rest.size(), strand.velocity[tip]);
 }
 
 void scale(std::vector<Vec3>& points, double factor) {

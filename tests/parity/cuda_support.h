@@ -74,6 +74,8 @@ struct HostGroom {
   state::StrandState<float> state;
   state::AlignedVector<float> strand_figures, contact_figures;
   state::AlignedVector<std::int32_t> skin;
+  kernels::Elongation<float> elongation{};
+  kernels::Air<float> air{};
   int substep = 0;
 
   explicit HostGroom(const state::StrandInput& input)
@@ -100,6 +102,15 @@ struct HostGroom {
     }
     return poses;
   }
+  // From now on integrity softens and breaks (the input asks for elongation), and air drags that moves with
+  // another velocity at every segment.
+  void soften_and_blow() {
+    state.elongation.assign(state.position.size() / 3, 0.0f);
+    elongation = {state.elongation.data(), {1, 0.005f, 0.02f, {0.005f}, {{0.005f, 1, -20, 0}}}, true};
+    state.air.resize(state.position.size());
+    for (std::size_t k = 0; k < state.air.size(); ++k) state.air[k] = static_cast<float>(k % 17) - 8;
+    air = {state.air.data(), {46, 9.6f}, {22, 0.1f}};
+  }
   // The next substep's root motion, into the state.
   void move_roots(double h) {
     const std::vector<Pose> before = roots(substep * h), after = roots((substep + 1) * h);
@@ -109,7 +120,8 @@ struct HostGroom {
   }
 
   kernels::StrandStep<float> strand_step(const kernels::StrandParameters<float>& parameters) {
-    return {model.view(), state.view(), state.root_motion.data(), parameters, strand_figures.data()};
+    return {model.view(), state.view(), state.root_motion.data(), parameters, strand_figures.data(),
+            elongation,   air};
   }
   void step(const kernels::StrandParameters<float>& parameters) {
     for_each_lane([&, step = strand_step(parameters)](int batch, int lane) {

@@ -77,9 +77,11 @@ void run_threads(HostGroom& groom, const Thread& make) {
   for (int thread = 0; thread < layout.batches() * kLanes; ++thread) function(thread);
 }
 
-void expect_steps_of_the_lanes(const state::StrandInput& input) {
+void expect_steps_of_the_lanes(state::StrandInput input, bool extras = false) {
   const StrandParameters<float> parameters = default_parameters();
+  input.elongation = extras && !input.companions;
   HostGroom lanes(input), threads(input);
+  if (extras) lanes.soften_and_blow(), threads.soften_and_blow();
   for (int k = 0; k < 10; ++k) {
     lanes.move_roots(parameters.step), threads.move_roots(parameters.step);
     lanes.step(parameters);
@@ -93,15 +95,24 @@ void expect_steps_of_the_lanes(const state::StrandInput& input) {
   EXPECT_EQ(lanes.state.position, threads.state.position);
   EXPECT_EQ(lanes.state.velocity, threads.state.velocity);
   EXPECT_EQ(lanes.state.companion_position, threads.state.companion_position);
+  EXPECT_EQ(lanes.state.elongation, threads.state.elongation);
   EXPECT_EQ(lanes.strand_figures, threads.strand_figures);
+  if (input.elongation) {
+    const auto broken = [](float e) { return e > 0.02f; };
+    EXPECT_TRUE(std::any_of(lanes.state.elongation.begin(), lanes.state.elongation.end(), broken));
+  }
 }
 
-TEST(CudaThreads, StepAsTheLanesDo) { expect_steps_of_the_lanes(mixed_strands(70, 1)); }
+TEST(CudaThreads, StepAsTheLanesDo) {
+  expect_steps_of_the_lanes(mixed_strands(70, 1));
+  expect_steps_of_the_lanes(mixed_strands(70, 1), true);
+}
 
 TEST(CudaThreads, StepMassSpringStrandsAsTheLanesDo) {
   state::StrandInput input = mixed_strands(70, 1);
   input.companions = true;
   expect_steps_of_the_lanes(input);
+  expect_steps_of_the_lanes(input, true);
 }
 
 TEST(CudaThreads, BlowAndShelterAsTheKernelsOfTheProcessorDo) {

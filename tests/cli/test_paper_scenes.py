@@ -1,5 +1,6 @@
 """The paper's scenes in reduced form: they run within their bounds, and each shows what its figure claims."""
 import json
+import re
 import subprocess
 import sys
 
@@ -226,3 +227,42 @@ def test_figures_are_listed_and_a_wrong_name_is_an_error(source):
     assert listed.returncode == 0 and "fig06_wig" in listed.stdout and "Figure 6" in listed.stdout
     wrong = run(source / "tools/figures", "fig99")
     assert wrong.returncode == 2 and "no figure fig99" in wrong.stderr
+
+
+# ---- The document ------------------------------------------------------------------------------------------------
+
+REPRODUCTION = SOURCE / "docs/reproduction.md"
+
+
+def health_of(figure):
+    numbers = json.loads((SOURCE / f"docs/figures/{figure}.json").read_text())
+    return next(numbers[key] for key in ("health", "full") if key in numbers) if "strands" not in numbers else numbers
+
+
+@pytest.mark.parametrize(
+    "scene, figure",
+    [
+        ("wind", "fig01_wind"),
+        ("asymmetric", "fig01_asymmetric"),
+        ("wig", "fig06_wig"),
+        ("hand", "fig07_hand"),
+        ("sphere", "fig08_sphere"),
+        ("grooming", "fig11_grooming"),
+    ],
+)
+def test_the_table_of_times_tells_what_was_measured(scene, figure):
+    row = re.search(rf"^\| {scene} \|(.*)\|$", REPRODUCTION.read_text(), re.MULTILINE)[1]
+    told = [float(cell.replace(",", "")) for cell in row.split("|")]
+    health = health_of(figure)
+    measured = [health[key] for key in ("strands", "particles", "core_ms_per_frame", "edge_strain_free", "edge_strain_moved")]
+    measured += [1e3 * health["push_out_max_m"], health["inside_worst"]]
+    assert told[:2] + told[3:] == pytest.approx(measured, rel=0.05)
+    assert health["edge_strain_free"] < STRAIN and health["edge_strain_moved"] < STRAIN and health["inside_worst"] == 0
+    assert (health["strands"], health["particles"] // 1000) == TABLE[scene]
+
+
+def test_the_documents_pictures_are_there_and_small():
+    named = re.findall(r"\((figures/[^)]+)\)", REPRODUCTION.read_text())
+    assert len(named) > 20
+    for name in named:
+        assert (REPRODUCTION.parent / name).stat().st_size < 300_000

@@ -148,6 +148,11 @@ class Run:
         return self.cache.offsets[1:] - 1
 
     @cached_property
+    def strand(self):
+        """[particles] index of each particle's strand."""
+        return np.repeat(np.arange(len(self.counts)), self.counts)
+
+    @cached_property
     def groom(self):
         """[strands] index of each strand's groom."""
         with h5py.File(self.cache.header) as file:
@@ -201,6 +206,11 @@ class Run:
         lines = (self.directory / f"{self.scene_name}.timings.jsonl").read_text().splitlines()
         seconds = {entry["frame"]: entry["seconds"] for entry in map(json.loads, lines)}
         return np.array([1e3 * seconds[frame] for frame in sorted(seconds) if frame > self.scene["frames"]["first"]])
+
+    @property
+    def core_milliseconds(self):
+        """Processor time of a stepped frame, summed over cores, with its share of starting and writing."""
+        return 1e3 * self.cpu_seconds / max(1, len(self.frames) - 1)
 
     # ---- Measures ----------------------------------------------------------------------------------------------------
 
@@ -266,7 +276,7 @@ class Run:
             "frames": len(self.frames),
             "substeps": self.scene["model"]["substeps"],
             "ms_per_frame_median": round(float(np.median(self.milliseconds)), 1),
-            "core_ms_per_frame": round(1e3 * self.cpu_seconds / max(1, len(self.frames) - 1), 1),
+            "core_ms_per_frame": round(self.core_milliseconds, 1),
             "edge_strain_free": self.worst("edge_strain_free"),
             "edge_strain_moved": self.worst("edge_strain_moved"),
             "edge_strain_moved_p999": self.worst("edge_strain_moved_p999"),

@@ -2,13 +2,15 @@
 import numpy as np
 
 from . import pictures
+from .inside import deeper_than
 
 GUIDES = (None, 2048, 128)
 FRAMES = [20, 32, 46, 58]
-COUNTED = range(18, 61, 3)  # frames in which the hand is in the hair
+COUNTED = range(18, 61, 4)  # frames in which the hand is in the hair
 HAND = 1  # solid; 0 is the head
 DEPTHS = (1e-4, 1e-3, 5e-3)  # [m]
 VIEW = (120, 12)
+CLOSE = 46  # frame
 
 
 def make(figures):
@@ -20,7 +22,7 @@ def make(figures):
     pictures.save(close_up(figures, runs), figures.path("_close.png"))
     figures.record(
         {"health": everything.health(COUNTED)}
-        | {name(count): penetration(run) | {"ms_per_frame_median": np.median(run.milliseconds)} for count, run in runs.items()}
+        | {name(count): penetration(run) | {"core_ms_per_frame": run.core_milliseconds} for count, run in runs.items()}
     )
 
 
@@ -33,27 +35,33 @@ def settings(count, quick):
 
 
 def close_up(figures, runs):
-    """The fingers in the hair, seen from the side they push."""
-    hand = runs[None].surfaces(40)[HAND][0]
-    camera = pictures.shared_camera([], (60, 12), figures.size(330), points=hand)
-    return pictures.sheet(
-        [[pictures.titled(pictures.render(run, 40, camera, **figures.look), name(count)) for count, run in runs.items()]]
-    )
+    """The fingers in the hair, from the side of the palm; not the forearm."""
+    hand = runs[None].surfaces(CLOSE)[HAND][0]
+    fingers = hand[np.hypot(hand[:, 0], hand[:, 2]) < 0.24]  # from the axis that the hand goes round
+    camera = pictures.shared_camera([], (165, 12), figures.size(330), points=fingers)
+    row = [pictures.render(run, CLOSE, camera, **figures.look) for run in runs.values()]
+    return pictures.sheet([[pictures.titled(image, name(count)) for image, count in zip(row, runs)]])
 
 
 def penetration(run):
-    """Particles inside the hand and inside the head, deeper than DEPTHS: the most of any counted frame and the mean over
-    them; and strands with a particle in the hand."""
+    """Particles inside the hand and inside the head, deeper than each of DEPTHS, the most of any counted frame, and the
+    strands that they are of."""
     result = {}
     for solid, called in ((HAND, "hand"), (0, "head")):
-        inside = {frame: run.inside(frame, DEPTHS[0], solid) for frame in COUNTED}
+        found = [deep(run, frame, solid) for frame in COUNTED]
         result[called] = {
-            "particles_most": max(int(each.sum()) for each in inside.values()),
-            "particles_mean": float(np.mean([each.sum() for each in inside.values()])),
-            "strands_most": max(int(np.logical_or.reduceat(each, run.roots).sum()) for each in inside.values()),
-            "deeper": {
-                f"{1e3 * depth:g} mm": max(int(run.inside(frame, depth, solid).sum()) for frame in COUNTED)
-                for depth in DEPTHS[1:]
-            },
+            f"particles deeper than {1e3 * depth:g} mm": max(len(each[depth]) for each in found) for depth in DEPTHS
         }
+        result[called]["strands"] = max(len(np.unique(run.strand[each[DEPTHS[0]]])) for each in found)
+    return result
+
+
+def deep(run, frame, solid):
+    """{depth: indices of the particles that are deeper inside the solid}"""
+    inside = np.flatnonzero(run.inside(frame, solid=solid))
+    position, mesh = run.position(frame), run.surfaces(frame)[solid]
+    result = {}
+    for depth in DEPTHS:
+        inside = inside[deeper_than(position[inside], depth, *mesh)]
+        result[depth] = inside
     return result

@@ -27,8 +27,10 @@ def inside_mesh(points, vertices, triangles):
     """[points] whether a majority of rays says that the closed mesh winds round the point."""
     if not len(points):
         return np.zeros(0, bool)
-    votes = sum((winding(points, vertices, triangles, way) != 0).astype(int) for way in DIRECTIONS)
-    return votes >= 2
+    first, second = (winding(points, vertices, triangles, way) != 0 for way in DIRECTIONS[:2])
+    split = np.flatnonzero(first != second)
+    first[split] = winding(points[split], vertices, triangles, DIRECTIONS[2]) != 0
+    return first
 
 
 def winding(points, vertices, triangles, way):
@@ -65,7 +67,7 @@ def _candidates(low, high, at):
     """Pairs (boxes, points), in parts, of those that share a cell of a grid; every box that holds a point is among its
     pairs. `low`, `high` [boxes, d], `at` [points, d]; d is 2 or 3."""
     floor, dimensions = low.min(0), low.shape[1]
-    cells = int(np.clip(len(low) ** (1 / dimensions), 8, 256))
+    cells = int(np.clip(2 * len(low) ** (1 / dimensions), 8, 256))
     size = (high.max(0) - floor) / cells + 1e-30
     strides = cells ** np.arange(dimensions)
 

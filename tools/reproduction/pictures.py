@@ -5,7 +5,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 LARGEST = 300_000  # bytes of a PNG
-INK = (70, 70, 75)
+INK, PAPER = (70, 70, 75), (225, 226, 228)
 GAP = 4  # pixels between pictures
 
 VIEWS = {"front": (0, 5), "side": (90, 5), "back": (180, 10), "three-quarter": (38, 8), "top": (0, 80)}
@@ -64,7 +64,7 @@ def titled(image, text):
     """The picture with a line of text in its upper left corner."""
     image = image.copy()
     font = ImageFont.load_default(size=max(11, image.height // 22))
-    ImageDraw.Draw(image).text((image.height // 40, image.height // 60), text, fill=INK, font=font, spacing=2)
+    ImageDraw.Draw(image).text((image.height // 40, image.height // 60), text, fill=INK, font=font, stroke_width=2, stroke_fill=PAPER)
     return image
 
 

@@ -24,14 +24,17 @@ class Track {
   bool empty() const { return pieces_.empty(); }
 
   struct Nearest {
-    double along, distance;
+    double along, distance;  // beyond the end `along` goes on, the distance is to the end
   };
   Nearest nearest(const Vec3& point) const {
     Nearest nearest{0, std::numeric_limits<double>::infinity()};
     for (const Piece& piece : pieces_) {
-      const double along = std::clamp((point - piece.from).dot(piece.direction), 0.0, piece.length);
+      const double ahead = (point - piece.from).dot(piece.direction);
+      const double along = std::clamp(ahead, 0.0, piece.length);
       const double distance = (piece.from + along * piece.direction - point).norm();
-      if (distance < nearest.distance) nearest = {piece.start + along, distance};
+      const bool is_last = &piece == &pieces_.back();
+      if (distance < nearest.distance)
+        nearest = {piece.start + (is_last ? std::max(ahead, 0.0) : along), distance};
     }
     return nearest;
   }

@@ -44,8 +44,8 @@ using SignedDistance = std::function<double(const Vec3&)>;
 //
 // Comb: what is combed is the present shape, and it becomes the rest shape, with the rest shape's lengths.
 // Segment after segment turns towards the point of the curve that lies its own length ahead, and carries what
-// follows, so that curls out of reach are not flattened. Past its end the curve goes straight on, but has no
-// reach there.
+// follows, so that curls out of reach are not flattened. Past its end the curve goes straight on, but its
+// reach is counted from the end.
 bool edit(EditedStrand& strand, const scene::GroomingOperation& operation, const SignedDistance& cutter = {});
 
 // The most particles that a strand of `rest` can come to have by `operations`, whatever its position, with

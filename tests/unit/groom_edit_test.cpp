@@ -408,6 +408,16 @@ TEST(GroomComb, PullsTowardsACurveBesideIt) {
   EXPECT_LE(std::abs(strand.rest.back().x()), 1e-6);
 }
 
+TEST(GroomComb, HairThatReachesPastTheEndGoesStraightOn) {
+  const scene::Comb comb{{Vec3::Zero(), 0.02 * Vec3::UnitX()}, 0.5, 1};
+  EditedStrand along = at_rest(line(Vec3::Zero(), 0.01 * Vec3::UnitX(), 20));
+  apply(along, comb);
+  EXPECT_LE(distance(along.rest, line(Vec3::Zero(), 0.01 * Vec3::UnitX(), 20)), 1e-14);
+  EditedStrand across = at_rest(line({0.03, 0.01, 0}, 0.01 * Vec3::UnitY(), 20));
+  ASSERT_TRUE(apply(across, comb));
+  for (std::size_t i = 1; i < 20; ++i) EXPECT_GT(across.rest[i].x(), across.rest[i - 1].x()) << i;
+}
+
 TEST(GroomComb, FindsTheWayBackFromTheOppositeDirection) {
   EditedStrand strand = at_rest(line(Vec3::Zero(), Vec3::UnitX(), 4));
   ASSERT_TRUE(apply(strand, scene::Comb{{Vec3::Zero(), -Vec3::UnitX()}, 1, 1}));

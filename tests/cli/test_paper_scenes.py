@@ -185,7 +185,8 @@ def test_growth_parameters_do_what_the_tables_show(program, tmp_path, parameter,
 
 @pytest.mark.parametrize("name", ["hand", "sphere"])
 def test_solids_are_what_the_tool_makes_and_closed(tmp_path, name):
-    subprocess.run([sys.executable, SOURCE / "tools/make-paper-assets", "-o", tmp_path], check=True, capture_output=True)
+    tool = SOURCE / "tools/make-paper-assets"
+    subprocess.run([sys.executable, tool, "-o", tmp_path], check=True, capture_output=True)
     committed = SCENES / "assets" / f"{name}.obj"
     assert (tmp_path / committed.name).read_bytes() == committed.read_bytes()
     vertices, triangles, _ = read_obj(committed)
@@ -254,7 +255,8 @@ def test_the_table_of_times_tells_what_was_measured(scene, figure):
     row = re.search(rf"^\| {scene} \|(.*)\|$", REPRODUCTION.read_text(), re.MULTILINE)[1]
     told = [float(cell.replace(",", "")) for cell in row.split("|")]
     health = health_of(figure)
-    measured = [health[key] for key in ("strands", "particles", "core_ms_per_frame", "edge_strain_free", "edge_strain_moved")]
+    keys = ("strands", "particles", "core_ms_per_frame", "edge_strain_free", "edge_strain_moved")
+    measured = [health[key] for key in keys]
     measured += [1e3 * health["push_out_max_m"], health["inside_worst"]]
     assert told[:2] + told[3:] == pytest.approx(measured, rel=0.05)
     assert health["edge_strain_free"] < STRAIN and health["edge_strain_moved"] < STRAIN and health["inside_worst"] == 0

@@ -57,9 +57,9 @@ def thinned(scene, share):
 
 
 def run_scene(scene, label, overrides=None, frames=None, work=WORK, options=()):
-    """Runs scenes/paper/SCENE.json with `overrides` ({pointer: value}) into work/LABEL and returns the Run. Divergence is
-    a result (Run.diverged_frame); any other failure raises RunError. `frames`: write only up to this one; `options`: of
-    the program, as they stand on its command line."""
+    """Runs scenes/paper/SCENE.json with `overrides` ({pointer: value}) into work/LABEL and returns the Run. Divergence
+    is a result (Run.diverged_frame); any other failure raises RunError. `frames`: write only up to this one; `options`:
+    of the program, as they stand on its command line."""
     path = SCENES / f"{scene}.json"
     settings = dict(overrides or {})
     if frames is not None:
@@ -88,9 +88,10 @@ def _child_seconds():
 
 
 def _stamp(path, settings):
-    """Changes with the scene, the settings, the program, and the files beside the scene."""
-    files = [PROGRAM, path, *sorted((SCENES / "assets").glob("*")), ROOT / "scenes/assets/head.obj"]
-    state = [(file.name, file.stat().st_size, file.stat().st_mtime_ns) for file in files]
+    """Changes with the program, the settings, and the contents of the scene and of the files beside it."""
+    files = [path, *sorted((SCENES / "assets").glob("*")), ROOT / "scenes/assets/head.obj"]
+    state = [PROGRAM.stat().st_size, PROGRAM.stat().st_mtime_ns]
+    state += [hashlib.sha256(file.read_bytes()).hexdigest() for file in files]
     return hashlib.sha256(json.dumps([state, settings], sort_keys=True).encode()).hexdigest()
 
 
@@ -233,8 +234,8 @@ class Run:
         return self.deviation(frame)[self.tips]
 
     def edge_strain(self, frame):
-        """[particles] (length / rest length - 1) of the segment before each particle; 0 at roots, on what is cut off, and
-        in a scene with grooming for each strand's last segment, which a cut may have made shorter."""
+        """[particles] (length / rest length - 1) of the segment before each particle; 0 at roots, on what is cut off,
+        and in a scene with grooming for each strand's last segment, which a cut may have made shorter."""
         length, whole = _segments(self.position(frame), self.roots), self.living(frame)
         if self.scene["effects"].get("grooming"):
             whole &= np.append(whole[1:], False)
@@ -255,8 +256,8 @@ class Run:
         return np.linalg.norm(self.field("velocity", frame), axis=1)
 
     def inside(self, frame, depth=0.0, solid=None):
-        """[particles] whether a particle, roots excepted, is more than `depth` inside a solid (or number `solid` alone),
-        counted by crossings and not by the simulator's level sets. Needs `solids` in cache.fields."""
+        """[particles] whether a particle, roots excepted, is more than `depth` inside a solid (or inside number `solid`)
+        as counted by crossings and not by the simulator's level sets. Needs `solids` in cache.fields."""
         from .inside import inside_solids
 
         surfaces = self.surfaces(frame)

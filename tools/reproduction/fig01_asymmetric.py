@@ -23,11 +23,12 @@ def make(figures):
 
     curves = {key: deviations(run) for key, run in runs.items()}
     pictures.plot(figures.path("_deviation.png"), lambda axes: draw(axes, first.times, curves), columns=2, width=8)
-    figures.record({"health": first.health(FRAMES[1:]), "runs": {" ".join(key): summary(runs[key], curves[key]) for key in runs}})
+    summaries = {" ".join(key): summary(runs[key], curves[key]) for key in runs}
+    figures.record({"health": first.health(FRAMES[1:]), "runs": summaries})
 
 
 def deviations(run):
-    """[frames, 2] mean deviation from the carried rest shape over the strand's length, of the long and of the short side."""
+    """[frames, 2] mean deviation from the carried rest shape over the strand's length: long side, short side."""
     groom = np.repeat(run.groom, run.counts)
     free = np.ones(len(groom), bool)
     free[run.roots] = False
@@ -53,6 +54,7 @@ def draw(axes, times, curves):
         for (model, scheme), curve in curves.items():
             style = "-" if scheme == "projected" else "--"
             colour = "tab:blue" if model == "ams" else "tab:red"
-            each.plot(times[: len(curve)], 100 * curve[:, side], style, color=colour, label=f"{MODELS[model]}, {scheme}")
+            percent, label = 100 * curve[:, side], f"{MODELS[model]}, {scheme}"
+            each.plot(times[: len(curve)], percent, style, color=colour, label=label)
         each.set(title=title, xlabel="time [s]", ylabel="mean deviation [% of strand]", ylim=(0, None))
     axes[1].legend(fontsize=8)

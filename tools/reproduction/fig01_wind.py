@@ -13,7 +13,8 @@ def make(figures):
     pictures.save(pictures.sheet([row[:3], row[3:]]), figures.path(".png"))
 
     wind = np.array(run.scene["effects"]["wind"]["keys"][-1]["velocity"])
-    downwind = [(run.position(frame) - run.carried_rest(frame))[run.tips] @ wind / np.linalg.norm(wind) for frame in run.frames]
+    wind /= np.linalg.norm(wind)
+    downwind = [(run.position(frame) - run.carried_rest(frame))[run.tips] @ wind for frame in run.frames]
     steady = np.array([np.median(tips) for tips in downwind])[run.times > 1]
     figures.record(
         run.health(FRAMES[1:])

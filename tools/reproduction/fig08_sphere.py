@@ -1,4 +1,4 @@
-"""Figure 8: a hollow sphere with an opening closes over flaring hair; all strands simulated, and skinned to 128 guides."""
+"""Figure 8: a hollow sphere closes over flaring hair; all strands simulated, and skinned to 128 guides."""
 import numpy as np
 
 from . import pictures
@@ -49,8 +49,8 @@ def caught(run, frame):
 
 
 def from_centre(run, frame):
-    """[particles] distance from the sphere's centre. The last two vertices of its mesh are the poles of the outer and of
-    the inner wall, on the axis on the far side of the opening: the centre is a radius before them."""
+    """[particles] distance from the sphere's centre. The last two vertices of its mesh are the poles of the outer and
+    of the inner wall, on the axis on the far side of the opening: the centre is a radius before them."""
     outer, inner = sphere(run, frame)[0][-2:].astype(float)
     centre = inner + INNER * (inner - outer) / np.linalg.norm(inner - outer)
     return np.linalg.norm(run.position(frame) - centre, axis=1)

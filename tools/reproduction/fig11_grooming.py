@@ -34,7 +34,7 @@ def geometry_alone(cut, uncut, frame, camera, **look):
 
 
 def last_whole(cut, frame):
-    """[cut strands] the last particle before the segment that the cut shortened; strands cut to their roots are left out."""
+    """[cut strands] the last particle before the segment that the cut shortened; not of strands cut to their roots."""
     left = np.add.reduceat(cut.living(frame).astype(int), cut.roots)
     shortened = (left < cut.counts) & (left > 2)
     return cut.roots[shortened] + left[shortened] - 2

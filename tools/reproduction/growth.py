@@ -13,7 +13,9 @@ def table(figures, parameter, name, values):
     camera = pictures.shared_camera(every, (38, 6), figures.size(230))
     rows = [
         [
-            pictures.titled(pictures.render(run, 1, camera, **figures.look), f"{name} {value:g}, step {1e3 * step:g} mm")
+            pictures.titled(
+                pictures.render(run, 1, camera, **figures.look), f"{name} {value:g}, step {1e3 * step:g} mm"
+            )
             for run, value in zip(row, values)
         ]
         for row, step in zip(runs, STEPS)

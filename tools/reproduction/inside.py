@@ -10,7 +10,7 @@ PAIRS = 4_000_000  # of points and triangles looked at at once
 
 
 def inside_solids(points, surfaces, depth=0.0):
-    """[points] whether each is inside one of the closed `surfaces` ((vertices, triangles) each), by more than `depth`."""
+    """[points] whether each is inside one of the closed `surfaces`, of (vertices, triangles), by more than `depth`."""
     found = np.zeros(len(points), bool)
     for vertices, triangles in surfaces:
         vertices = np.asarray(vertices, float)
@@ -48,8 +48,8 @@ def winding(points, vertices, triangles, way):
 
 
 def _crossing(corner, at):
-    """(sign, height): +1 where the triangle's projection holds the point and faces along the ray, -1 against it, 0 where
-    it does not hold it; and the height at which it is met."""
+    """(sign, height): +1 where the triangle's projection holds the point and faces along the ray, -1 against it, 0
+    where it does not hold it; and the height at which it is met."""
     a, b, c = corner[:, 0], corner[:, 1], corner[:, 2]
 
     def twice_area(p, q):

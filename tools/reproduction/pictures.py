@@ -16,8 +16,8 @@ VIEWS = {"front": (0, 5), "side": (90, 5), "back": (180, 10), "three-quarter": (
 
 def render(run, frame, camera=None, view="three-quarter", size=(320, 320), samples=16, colour="brown", strands=None,
            position=None, living=None):
-    """A picture of a frame. `camera` of shared_camera() for pictures that are to be compared; `strands`: indices of those
-    to draw; `position` and `living`, a mask of particles: drawn in place of the frame's."""
+    """A picture of a frame. `camera` of shared_camera() for pictures that are to be compared; `strands`: indices of
+    those to draw; `position` and `living`, a mask of particles: drawn in place of the frame's."""
     import studio
 
     camera = camera or shared_camera([(run, frame)], view, size)
@@ -64,7 +64,8 @@ def titled(image, text):
     """The picture with a line of text in its upper left corner."""
     image = image.copy()
     font = ImageFont.load_default(size=max(11, image.height // 22))
-    ImageDraw.Draw(image).text((image.height // 40, image.height // 60), text, fill=INK, font=font, stroke_width=2, stroke_fill=PAPER)
+    corner = (image.height // 40, image.height // 60)
+    ImageDraw.Draw(image).text(corner, text, fill=INK, font=font, stroke_width=2, stroke_fill=PAPER)
     return image
 
 

@@ -154,7 +154,7 @@ void TypedSimulation<T>::make_plan() {
   plan_.stages.push_back({"roots", "root frames carried by the head", true,
                           (before_.size() + now_.size()) * sizeof(Pose), roots_.still() ? 0 : substeps});
   add("wind", "mean wind, gusts, turbulence, shelter");
-  add("strands", "springs, ghosts, implicit step, lengths");
+  add("strands", "the strand model: forces, implicit step, lengths");
   add("solids", "collision with level sets, friction");
   const auto add_host = [&](const char* name, const char* what, bool runs, std::size_t bytes) {
     plan_.stages.push_back({name, what, runs, runs ? bytes : 0, 0});  // no kernels of the device

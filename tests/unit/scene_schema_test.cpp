@@ -1,6 +1,7 @@
 // The schema is the single source of defaults and words: the code's are those.
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <fstream>
 #include <numbers>
 #include <set>
@@ -197,6 +198,42 @@ TEST_F(SceneSchema, FillsInExactlyTheSchemasDefaults) {
   for (const char* name : {"geometric_stiffness", "material_damping", "angular_tangent", "integrity_tangent"})
     tested.insert(defs + "model/then/properties/" + name + "/default");  // below
   EXPECT_EQ(tested, in_schema) << "a default without a test, or a test without a default";
+}
+
+// The drag of a thin cylinder in air, force per metre [N/m] at a speed [m/s]: across it by the correlation of
+// Sucker and Brauer (1975), along it by that of Glauert and Lighthill (1955) for its boundary layer, averaged
+// over 0.2 m.
+constexpr double kDiameter = 8e-5, kViscosity = 1.5e-5, kDensity = 1.2;  // [m], kinematic [m^2/s], [kg/m^3]
+
+double drag_across(double speed) {
+  const double re = speed * kDiameter / kViscosity;
+  const double coefficient =
+      1.18 + 6.8 / std::pow(re, 0.89) + 1.96 / std::sqrt(re) - 4e-4 * re / (1 + 3.64e-7 * re * re);
+  return 0.5 * kDensity * speed * speed * kDiameter * coefficient;
+}
+
+double drag_along(double speed) {
+  constexpr double kLength = 0.2, kEuler = 0.5772156649, kRadius = kDiameter / 2;
+  constexpr int kParts = 1000;
+  double sum = 0;
+  for (int k = 0; k < kParts; ++k) {
+    const double x = kLength * (k + 0.5) / kParts;
+    const double layer = std::log(4 * kViscosity * x / (speed * kRadius * kRadius)) - kEuler;
+    if (layer > 1)
+      sum += 4 * std::numbers::pi * kDensity * kViscosity * speed / layer;  // behind the very front
+  }
+  return sum / kParts;
+}
+
+TEST_F(SceneSchema, DefaultDragIsThatOfAHairInAir) {
+  const Wind wind = *load_json(minimal(), {"/effects/wind/velocity=[1,0,0]"}).effects.wind;
+  for (double speed = 0.3; speed < 20.1; speed *= 1.1) {
+    const auto force = [&](const DragCoefficients& drag) {
+      return drag.linear * speed + drag.quadratic * speed * speed;
+    };
+    EXPECT_NEAR(force(wind.normal) / drag_across(speed), 1, 0.12) << speed;
+    EXPECT_NEAR(force(wind.tangential) / drag_along(speed), 1, 0.14) << speed;
+  }
 }
 
 TEST_F(SceneSchema, TakesThePapersVariantsFromItsScheme) {

@@ -10,7 +10,7 @@ from reproduction.common import run_scene
 
 SPEEDS = (1, 3, 10)
 RIDE, TURN = "roller_coaster", "../quickstart"  # scenes, as seen from scenes/paper
-STRANDS = {RIDE: 75, TURN: 120}
+STRANDS = {RIDE: 48, TURN: 112}
 AFTER = {RIDE: 216, TURN: 120}  # frames after the motion's end; torn hair swings freely, its speed halves in 2 s
 MODELS = {"ams": {}, "paper": {"/model/scheme": "paper"}, "mass_spring": {"/model/type": "mass_spring"}}
 

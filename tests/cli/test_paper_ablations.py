@@ -127,7 +127,7 @@ def test_the_beard_keeps_its_shape_with_ams_alone(figures, scheme, bound):
 
 
 def ride(figures, variant, scheme="projected"):
-    settings = {"/model/scheme": scheme, "/groom/grow/strands": 75} | VARIANTS[variant]
+    settings = {"/model/scheme": scheme, "/groom/grow/strands": 48} | VARIANTS[variant]
     return Ride(figures.run("roller_coaster", f"ride_{variant}_{scheme}", settings).directory)
 
 

@@ -6,20 +6,12 @@ import h5py
 import numpy as np
 import pytest
 
+from scenes import run, setting
 from small_cache import ball
 from tiny import LAST, PARTICLES, RADIUS, STRANDS, data_bytes, frame_bytes, strands, write_scene
 
 WIND = {"velocity": [4, 0, 1], "gusts": {}, "turbulence": {"strength": 0.5}, "shelter": {}}
 SOFT = {"curve": [[0.02, 0.02], [0.1, 0.05]]}
-
-
-def run(program, scene, out, *options):
-    command = [program, "run", scene, "-o", out, "--progress", "none", *options]
-    return subprocess.run(command, capture_output=True, text=True)
-
-
-def setting(pointer, value):
-    return ["--set", f"{pointer}={json.dumps(value)}"]
 
 
 @pytest.fixture(scope="module")

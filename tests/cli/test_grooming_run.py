@@ -6,18 +6,10 @@ import h5py
 import numpy as np
 import pytest
 
+from scenes import run, setting
 from tiny import LENGTH, PARTICLES, STRANDS, frame_bytes, write_scene
 
 LAST = 8
-
-
-def run(program, scene, out, *options):
-    command = [program, "run", scene, "-o", out, "--progress", "none", *options]
-    return subprocess.run([str(word) for word in command], capture_output=True, text=True)
-
-
-def setting(pointer, value):
-    return ["--set", f"{pointer}={json.dumps(value)}"]
 
 
 def grooming(*operations):

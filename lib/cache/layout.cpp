@@ -105,6 +105,10 @@ state::Interpolation read_interpolation(const h5::Object& root, hsize_t strands)
   for (const std::int32_t strand : to.guides)
     if (strand < 0 || static_cast<hsize_t>(strand) >= strands)
       root.fail("interpolation/guides names strand " + std::to_string(strand) + ", which does not exist");
+  for (const std::int32_t guide : to.guide)
+    if (guide < -1 || guide >= static_cast<std::int32_t>(to.guides.size()))
+      root.fail("interpolation/guide names guide " + std::to_string(guide) + " of " +
+                std::to_string(to.guides.size()));
   return to;
 }
 
@@ -297,6 +301,20 @@ void write_frame(const h5::Object& root, const state::Frame& frame, const Storag
   }
 }
 
+namespace {
+
+std::vector<std::int32_t> read_living(const h5::Object& root, const state::RunHeader* header) {
+  const hsize_t strands = header ? header->root_triangle.size() : h5::kAny;
+  std::vector<std::int32_t> living = root.read<std::int32_t>("living", {strands});
+  for (std::size_t s = 0; s < living.size(); ++s)
+    if (living[s] < 1 || (header && living[s] > header->offsets[s + 1] - header->offsets[s]))
+      root.fail("living tells of " + std::to_string(living[s]) + " particles of strand " + std::to_string(s) +
+                ", which has no such number");
+  return living;
+}
+
+}  // namespace
+
 state::Frame read_frame(const h5::Object& root, const state::RunHeader* header) {
   const hsize_t particles = header ? header->rest_position.size() / 3 : h5::kAny;
   state::Frame frame;
@@ -305,8 +323,7 @@ state::Frame read_frame(const h5::Object& root, const state::RunHeader* header) 
   frame.position = root.read<float>("position", {particles, 3});
   if (root.has("velocity")) frame.velocity = root.read<float>("velocity", {frame.position.size() / 3, 3});
   if (root.has("elongation")) frame.elongation = root.read<float>("elongation", {frame.position.size() / 3});
-  if (root.has("living"))
-    frame.living = root.read<std::int32_t>("living", {header ? header->root_triangle.size() : h5::kAny});
+  if (root.has("living")) frame.living = read_living(root, header);
   if (root.has("guides")) frame.guide_position = root.group("guides").read<float>("position", {h5::kAny, 3});
   frame.figures = read_figures(root);
   if (!root.has("surfaces")) return frame;

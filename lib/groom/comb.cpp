@@ -60,37 +60,35 @@ Quat turn_part(const Vec3& from, const Vec3& to, double fraction) {
   return Quat(Eigen::AngleAxisd(fraction * whole.angle(), whole.axis()));
 }
 
-// The combed shape's unit directions, and whether any differs from the present.
-struct Combed {
-  std::vector<Vec3> directions;
-  bool turned = false;
-};
-
-Combed comb_shape(const std::vector<Vec3>& position, const Track& track, const scene::Comb& by) {
-  Combed combed;
+// How far each segment has turned, in the world; identity up to the first that the comb reaches. The first
+// `held` particles are prescribed: the segments between them stay.
+std::vector<Quat> comb_turns(const std::vector<Vec3>& position, const Track& track, const scene::Comb& by,
+                             std::size_t held) {
+  std::vector<Quat> turns;
   Quat carried = Quat::Identity();
   Vec3 from = position.front();
+  bool turned = false;
   for (std::size_t i = 0; i + 1 < position.size(); ++i) {
     const Vec3 segment = position[i + 1] - position[i];
     const double length = segment.norm();
     Vec3 direction = length > 0 ? Vec3(carried * (segment / length)) : Vec3::Zero();
     const auto [along, distance] = track.nearest(from);
     const Vec3 towards = track.at(along + length) - from;
-    if (distance < by.radius && length > 0 && towards.squaredNorm() > 0) {
+    if (i + 1 >= held && distance < by.radius && length > 0 && towards.squaredNorm() > 0) {
       const double falloff = 1 - distance * distance / (by.radius * by.radius);
       const double strength = by.strength * falloff * falloff;
       if (strength > 0) {
         const Quat turn = turn_part(direction, towards.normalized(), strength);
         direction = (turn * direction).normalized();
         carried = (turn * carried).normalized();
-        combed.turned = true;
+        turned = true;
       }
     }
-    combed.directions.push_back(direction);
+    turns.push_back(carried);
     // As it was, to the last bit, up to where it first turns.
-    from = combed.turned ? Vec3(from + length * direction) : position[i + 1];
+    from = turned ? Vec3(from + length * direction) : position[i + 1];
   }
-  return combed;
+  return turned ? turns : std::vector<Quat>();
 }
 
 }  // namespace
@@ -98,12 +96,21 @@ Combed comb_shape(const std::vector<Vec3>& position, const Track& track, const s
 bool comb(EditedStrand& strand, const scene::Comb& by) {
   const Track track(by.curve);
   if (track.empty()) return false;
-  const Combed combed = comb_shape(strand.position, track, by);
-  if (!combed.turned) return false;
+  const std::vector<Quat> turns = comb_turns(strand.position, track, by, strand.held);
+  if (turns.empty()) return false;
+  // The rest shape's segments turn as those of the present shape did: what the strand bears, its weight or a
+  // wind, is not combed into it.
+  const Quat root(strand.rotation);
   std::vector<Vec3> rest = {strand.rest.front()};
-  for (std::size_t i = 0; i < combed.directions.size(); ++i) {
-    const double length = (strand.rest[i + 1] - strand.rest[i]).norm();
-    rest.push_back(rest.back() + length * (strand.rotation.transpose() * combed.directions[i]));
+  bool turned = false;
+  for (std::size_t i = 0; i < turns.size(); ++i) {
+    turned = turned || turns[i].vec() != Vec3::Zero();
+    const Vec3 segment = strand.rest[i + 1] - strand.rest[i];
+    const Vec3 combed = root.conjugate() * (turns[i] * (root * segment));
+    const double size = combed.norm();
+    rest.push_back(!turned    ? strand.rest[i + 1]
+                   : size > 0 ? Vec3(rest.back() + (segment.norm() / size) * combed)
+                              : rest.back());
   }
   strand.rest = std::move(rest);
   return true;

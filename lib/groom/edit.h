@@ -20,6 +20,7 @@ struct EditedStrand {
   std::vector<Vec3> velocity;  // [m/s]
   Mat3 rotation;               // of the root's frame, from the rest pose to now
   double spacing = 0;          // [m] least distance of particles that are added; of a run, that of its start
+  std::size_t held = 1;        // particles at the root that are prescribed: a comb does not turn them
 };
 
 // The distance at which a strand of this rest shape would be continued [m]: its mean segment, a short last

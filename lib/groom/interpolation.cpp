@@ -104,15 +104,11 @@ auto points_of(Points& points, const std::vector<std::int64_t>& offsets, std::si
   return std::span(points).subspan(offsets[strand], offsets[strand + 1] - offsets[strand]);
 }
 
-// Arc length from the root at each point, over the whole; evenly spaced where there is none.
-std::vector<double> shares_of_length(std::span<const Vec3> points) {
-  std::vector<double> share(points.size(), 0.0);
-  for (std::size_t i = 1; i < points.size(); ++i)
-    share[i] = share[i - 1] + (points[i] - points[i - 1]).norm();
-  const double length = share.back();
-  for (std::size_t i = 0; i < share.size(); ++i)
-    share[i] = length > 0 ? share[i] / length : static_cast<double>(i) / static_cast<double>(points.size());
-  return share;
+// Arc length from the root at each point [m].
+std::vector<double> arc_lengths(std::span<const Vec3> points) {
+  std::vector<double> at(points.size(), 0.0);
+  for (std::size_t i = 1; i < points.size(); ++i) at[i] = at[i - 1] + (points[i] - points[i - 1]).norm();
+  return at;
 }
 
 // The guides' roots as nanoflann sees them.
@@ -179,20 +175,20 @@ void Interpolation::follow_nearest(std::size_t first_strand, std::size_t first_g
 }
 
 void Interpolation::find_places(std::size_t first_strand, std::size_t first_guide) {
-  std::vector<std::vector<double>> shares;  // of the guides from the first on
+  std::vector<std::vector<double>> lengths;  // along the guides from the first on
   for (std::size_t g = first_guide; g < guides_.size(); ++g)
-    shares.push_back(shares_of_length(points_of(guide_rest_.points, guide_rest_.offsets, g)));
+    lengths.push_back(arc_lengths(points_of(guide_rest_.points, guide_rest_.offsets, g)));
   tbb::parallel_for(tbb::blocked_range<std::size_t>(first_strand, strands(), 64), [&](const auto& range) {
     for (std::size_t s = range.begin(); s < range.end(); ++s) {
-      const std::vector<double> own = shares_of_length(points_of(rest_, offsets_, s));
+      const std::vector<double> own = arc_lengths(points_of(rest_, offsets_, s));
       for (int k = 0; k < neighbours_ && guide_[s * neighbours_ + k] >= 0; ++k) {
         const std::int32_t guide = guide_[s * neighbours_ + k];
-        const std::vector<double>& share = shares[guide - first_guide];
+        const std::vector<double>& along = lengths[guide - first_guide];
         std::size_t below = 0;
         for (std::size_t i = 0; i < own.size(); ++i) {
-          while (below + 2 < share.size() && share[below + 1] <= own[i]) ++below;
-          const double span = below + 1 < share.size() ? share[below + 1] - share[below] : 0;
-          const double on = span > 0 ? std::clamp((own[i] - share[below]) / span, 0.0, 1.0) : 0;
+          while (below + 2 < along.size() && along[below + 1] <= own[i]) ++below;
+          const double span = below + 1 < along.size() ? along[below + 1] - along[below] : 0;
+          const double on = span > 0 ? std::clamp((own[i] - along[below]) / span, 0.0, 1.0) : 0;
           places_[(offsets_[s] + i) * neighbours_ + k] = {
               static_cast<std::int32_t>(guide_rest_.offsets[guide] + below), static_cast<float>(on)};
         }

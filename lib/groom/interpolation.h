@@ -1,13 +1,14 @@
 // Guides and the strands that follow them: linear hair skinning.
 //
-// A point x of a follower at rest hangs on each of its guides at the same share of the length. A guide's
-// particle k carries it rigidly, by where it went and how the guide turned there since the rest pose:
+// A point x of a follower at rest hangs on each of its guides at the same distance from the root along the
+// hair, or on the guide's tip where that is shorter. A guide's particle k carries it rigidly, by where it
+// went and how the guide turned there since the rest pose:
 //
 //   follow_k(x) = p_k + R_k (x - P_k),   P_k, p_k the particle at rest and now, R_k rest to now
 //
-// Between two particles of a guide the two are blended linearly, and so are the guides, by weights of the
-// roots' distances. Rigid motion of all guides passes on exactly. The follower is then moved as a whole so
-// that its root is where the head holds it.
+// Between two particles of a guide the two are blended linearly, and so are the guides, by the inverse
+// squares of the roots' distances. Rigid motion of all guides passes on exactly. The follower is then moved
+// as a whole so that its root is where the head holds it.
 #pragma once
 #include <span>
 #include <vector>

@@ -13,13 +13,8 @@ bool asks_for(const scene::Scene& scene, const char* field) {
   return std::find(fields.begin(), fields.end(), field) != fields.end();
 }
 
-// Whether the cache holds strands that were not simulated.
-bool holds_followers(const scene::Scene& scene, const World& world) {
-  return world.interpolated && scene.cache.strands != scene::StoredStrands::kGuides;
-}
-
-const StrandSet& strands_of_cache(const scene::Scene& scene, const World& world) {
-  return holds_followers(scene, world) ? world.interpolated->all : world.simulated;
+const StrandSet& strands_of_cache(const World& world) {
+  return world.interpolated ? world.interpolated->all : world.simulated;
 }
 
 const char* axis_name(scene::Axis axis) {
@@ -107,19 +102,18 @@ std::vector<Vec3> follow(const World& world, const std::vector<Vec3>& guides, do
   return out;
 }
 
-// Following is a function of the guides and the time: its derivative along their motion, by central
-// differences. The step is far below any motion's time scale and far above the rounding of double precision.
-std::vector<Vec3> follow_velocities(const World& world, const std::vector<Vec3>& guides,
-                                    const std::vector<Vec3>& velocities, double time) {
-  constexpr double kStep = 1e-5;  // [s]
-  const auto at = [&](double step) {
-    std::vector<Vec3> moved = guides;
-    for (std::size_t i = 0; i < moved.size(); ++i) moved[i] += step * velocities[i];
-    return follow(world, moved, time + step);
-  };
-  std::vector<Vec3> out = at(kStep);
-  const std::vector<Vec3> before = at(-kStep);
-  for (std::size_t i = 0; i < out.size(); ++i) out[i] = (out[i] - before[i]) / (2 * kStep);
+// The change of what follows over the last substep h, the guides going straight: as the solver has the
+// velocity of a root, so that a follower of a guide that moves rigidly has that guide's.
+std::vector<Vec3> follow_velocities(const scene::Scene& scene, const World& world,
+                                    const std::vector<Vec3>& guides, const std::vector<Vec3>& velocities,
+                                    const std::vector<Vec3>& now, double time) {
+  std::vector<Vec3> out(now.size(), Vec3::Zero());
+  const double step = 1 / (scene.frames.fps * scene.model.substeps), first = first_time(scene.frames);
+  if (time < first + 0.5 * step) return out;  // nothing has moved yet
+  std::vector<Vec3> before = guides;
+  for (std::size_t i = 0; i < before.size(); ++i) before[i] -= step * velocities[i];
+  const std::vector<Vec3> followed = follow(world, before, std::max(time - step, first));
+  for (std::size_t i = 0; i < out.size(); ++i) out[i] = (now[i] - followed[i]) / step;
   return out;
 }
 
@@ -129,16 +123,18 @@ void add_strands(const scene::Scene& scene, const World& world, const Simulated<
   const double unit = scene.units.metres_per_unit;
   const bool velocity = asks_for(scene, "velocity"), elongation = asks_for(scene, "elongation");
   const std::vector<Vec3> positions = simulated.positions();
-  if (!holds_followers(scene, world)) {
+  if (!world.interpolated) {
     frame.position = in_units(positions, unit);
     if (velocity) frame.velocity = in_units(simulated.velocities(), unit);
     if (elongation) frame.elongation = simulated.elongations();
     return;
   }
-  frame.position = in_units(follow(world, positions, frame.time), unit);
+  const std::vector<Vec3> followed = follow(world, positions, frame.time);
+  frame.position = in_units(followed, unit);
   if (scene.cache.strands == scene::StoredStrands::kBoth) frame.guide_position = in_units(positions, unit);
   if (velocity)
-    frame.velocity = in_units(follow_velocities(world, positions, simulated.velocities(), frame.time), unit);
+    frame.velocity = in_units(
+        follow_velocities(scene, world, positions, simulated.velocities(), followed, frame.time), unit);
   if (!elongation) return;
   frame.elongation.resize(frame.position.size() / 3);
   world.interpolation().blend(simulated.elongations(), frame.elongation);
@@ -146,13 +142,13 @@ void add_strands(const scene::Scene& scene, const World& world, const Simulated<
 
 }  // namespace
 
-std::int64_t strand_in_cache(const scene::Scene& scene, const World& world, std::int64_t simulated) {
-  return holds_followers(scene, world) ? world.interpolation().guides()[simulated] : simulated;
+std::int64_t strand_in_cache(const World& world, std::int64_t simulated) {
+  return world.interpolated ? world.interpolation().guides()[simulated] : simulated;
 }
 
 state::RunHeader make_header(const scene::Scene& scene, const World& world) {
   const double unit = scene.units.metres_per_unit;
-  const StrandSet& set = strands_of_cache(scene, world);
+  const StrandSet& set = strands_of_cache(world);
   state::RunHeader header;
   header.name = scene.name;
   header.scene_json = scene.resolved;
@@ -170,7 +166,7 @@ state::RunHeader make_header(const scene::Scene& scene, const World& world) {
   for (const float width : set.strands.widths) header.width.push_back(static_cast<float>(width / unit));
   header.groom_of_strand = set.groom_of_strand;
   for (const scene::Groom& groom : scene.grooms) header.groom_names.push_back(groom.name);
-  if (holds_followers(scene, world)) header.interpolation = interpolation_of(scene, world.interpolation());
+  if (world.interpolated) header.interpolation = interpolation_of(scene, world.interpolation());
   if (!asks_for(scene, "solids")) return header;
   for (std::size_t k = 0; k < world.shown.size(); ++k) {
     state::Surface surface{world.shown_names[k], {}};
@@ -190,10 +186,10 @@ state::Frame make_frame(const scene::Scene& scene, const World& world, const sta
   add_strands(scene, world, Simulated<T>{model, state, world.simulated.strands.offsets}, frame);
   if (!scene.effects.grooming.empty()) {
     // Grooming is for grooms whose strands are all simulated; of the others every strand keeps its particles.
-    const StrandSet& set = strands_of_cache(scene, world);
+    const StrandSet& set = strands_of_cache(world);
     for (std::size_t s = 0; s < set.strands.size(); ++s) frame.living.push_back(set.strands.count(s));
     for (std::size_t s = 0; s < model.layout.strands(); ++s)
-      frame.living[strand_in_cache(scene, world, static_cast<std::int64_t>(s))] = model.living(s);
+      frame.living[strand_in_cache(world, static_cast<std::int64_t>(s))] = model.living(s);
   }
   if (!asks_for(scene, "solids")) return frame;
   for (const solids::AnimatedMesh* mesh : world.shown) {

@@ -16,6 +16,6 @@ state::Frame make_frame(const scene::Scene& scene, const World& world, const sta
                         const state::StrandState<T>& state, int number, double time);
 
 // The strand of the cache that a simulated one is.
-std::int64_t strand_in_cache(const scene::Scene& scene, const World& world, std::int64_t simulated);
+std::int64_t strand_in_cache(const World& world, std::int64_t simulated);
 
 }  // namespace ringlet::pipeline

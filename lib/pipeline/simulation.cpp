@@ -110,6 +110,7 @@ class TypedSimulation : public Simulation {
   void start();
   void resume(const state::Snapshot& snapshot);
   void groom(int frame);
+  void renew_executor();
   void step_frame(int frame, effects::FrameReport& report, StageSeconds& seconds);
   void move_roots(double time);
   void check(const effects::Stage<T>& stage, int frame);
@@ -200,6 +201,7 @@ void TypedSimulation<T>::step_frame(int frame, effects::FrameReport& report, Sta
   const double step = 1.0 / (scene_.frames.fps * substeps);
   seconds.assign(1, {"roots", 0.0});
   for (const auto& stage : stages_) seconds.emplace_back(stage->name(), 0.0);
+  if (grooming_) seconds.emplace_back("grooming", 0.0);
   if (world_.interpolated) seconds.emplace_back("interpolation", 0.0);
   for (int s = 0; s < substeps; ++s) {
     const effects::Substep substep{frame,  time_of(frame - 1, s), time_of(frame - 1, s + 1), step,
@@ -241,7 +243,7 @@ void TypedSimulation<T>::check(const effects::Stage<T>& stage, int frame) {
                    "{:.3g} m/s",
                    scene_.limits.edge_strain, scene_.limits.speed, std::sqrt(fastest))
              : std::string("a value is not finite");
-  const std::int64_t told = strand_in_cache(scene_, world_, strand);
+  const std::int64_t told = strand_in_cache(world_, strand);
   throw Diverged(frame_now(frame), stage.name(), told, particle,
                  fmt::format("the simulation diverged in stage `{}`, strand {}, particle {}: {}",
                              stage.name(), told, particle, how));
@@ -252,15 +254,21 @@ void TypedSimulation<T>::resume(const state::Snapshot& snapshot) {
   restore(snapshot, model_, state_, grooming_.has_value());
   roots_.pose(time_of(snapshot.frame, 0), now_);
   for (std::size_t s = 0; s < now_.size(); ++s) set_root_motion(state_, model_.layout, s, now_[s], now_[s]);
-  if (grooming_) executor_ = make_executor(model_, options_);
+  if (grooming_) renew_executor();
   executor_->submit(state_);
 }
 
-// The strands change under the executor, which has to be told.
+// The strands have changed under the executor. The old one goes first: a device need not hold both.
+template <class T>
+void TypedSimulation<T>::renew_executor() {
+  executor_.reset();
+  executor_ = make_executor(model_, options_);
+}
+
 template <class T>
 void TypedSimulation<T>::groom(int frame) {
   if (!grooming_ || !grooming_->apply(frame, now_)) return;
-  executor_ = make_executor(model_, options_);
+  renew_executor();
   executor_->submit(state_);
   executor_->submit_roots(state_);
 }
@@ -274,6 +282,13 @@ bool TypedSimulation<T>::run(const FrameRange& range, state::FrameSink& sink, co
   const auto hand_on = [&](state::Frame out, double spent) {
     out.figures = figures_of(report, strand_steps);
     sink.write(std::move(out), save(frame, model_, state_, grooming_.has_value()), spent);
+  };
+  // Counted where the plan has such a stage.
+  const auto timed = [&](const char* name, const auto& work) {
+    const Timer timer;
+    work();
+    for (auto& [stage, spent] : seconds)
+      if (stage == name) spent += timer.seconds();
   };
   start();
   if (control.resume) {
@@ -292,13 +307,9 @@ bool TypedSimulation<T>::run(const FrameRange& range, state::FrameSink& sink, co
     report = empty_report(roots_.strands());
     step_frame(frame, report, seconds);
     executor_->fetch(state_);
-    groom(frame);
+    timed("grooming", [&] { groom(frame); });
     state::Frame out;
-    if (frame >= range.first) {
-      const Timer frame_timer;
-      out = frame_now(frame);
-      if (world_.interpolated) seconds.back().second = frame_timer.seconds();
-    }
+    if (frame >= range.first) timed("interpolation", [&] { out = frame_now(frame); });
     const double spent = timer.seconds();
     if (report.swept > 0 && !swept)
       log_info(fmt::format(

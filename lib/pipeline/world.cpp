@@ -202,17 +202,37 @@ void append(const Held& held, std::int32_t groom, const scene::Groom& desc, Stra
   }
 }
 
-// Room at the tips for what grooming may add, filled with the tip itself.
-groom::Strands with_room(const scene::Scene& scene, const scene::Groom& desc, const groom::Strands& strands) {
+std::vector<std::int32_t> counts_of(const groom::Strands& strands) {
+  std::vector<std::int32_t> counts;
+  for (std::size_t s = 0; s < strands.size(); ++s) counts.push_back(strands.count(s));
+  return counts;
+}
+
+// Of the scene's grooming what is done to this groom.
+std::vector<scene::GroomingOperation> operations_on(const scene::Scene& scene, const scene::Groom& desc) {
   std::vector<scene::GroomingOperation> operations;
   for (const scene::GroomingOperation& operation : scene.effects.grooming)
     if (operation.groom.empty() || operation.groom == desc.name) operations.push_back(operation);
-  groom::Strands roomy;
-  roomy.groups = strands.groups, roomy.group_names = strands.group_names;
+  return operations;
+}
+
+// Room at the tips for what grooming may add, filled with the tip itself.
+groom::Strands with_room(const scene::Scene& scene, const scene::Groom& desc, const groom::Strands& strands) {
+  constexpr std::size_t kMost = 16384;  // particles of a strand: beyond, a length is a mistake of units
+  const std::vector<scene::GroomingOperation> operations = operations_on(scene, desc);
+  if (operations.empty()) return strands;
+  groom::Strands roomy = strands;
+  roomy.points.clear(), roomy.widths.clear(), roomy.offsets = {0};
   for (std::size_t s = 0; s < strands.size(); ++s) {
     const std::size_t first = strands.offsets[s], count = strands.count(s);
     const std::size_t room =
         std::max(count, groom::most_particles(std::span(strands.points).subspan(first, count), operations));
+    if (room > std::max(count, kMost))
+      throw Error(ErrorKind::kInput, "/effects/grooming",
+                  fmt::format("lengthens strand {} of groom `{}` to {} particles, expected at most {}", s,
+                              desc.name, room, kMost),
+                  "lengthen by less, or with \"mode\": \"scale\"; a groom of fewer particles a metre has "
+                  "room for more");
     for (std::size_t i = 0; i < room; ++i) {
       roomy.points.push_back(strands.points[first + std::min(i, count - 1)]);
       roomy.widths.push_back(strands.widths[first + std::min(i, count - 1)]);
@@ -233,29 +253,32 @@ void build_groom(const scene::Scene& scene, std::size_t index, bool scales_stiff
   if (desc.interpolate) held.guides = groom::choose_guides(strands, *desc.interpolate);
   held.attachment = attach(world, desc, strands);
   clear_head(scene, desc, world, held);
+  if (std::find(held.guides.begin(), held.guides.end(), 1) == held.guides.end())
+    throw Error(ErrorKind::kInput, desc.interpolate->pointer,
+                "every guide starts inside the head and was pruned",
+                "choose other guides, or use \"penetration\": \"push_out\"");
   const auto groom = static_cast<std::int32_t>(index);
+  std::vector<std::int32_t> counts = counts_of(strands);
+  strands = with_room(scene, desc, strands);  // one that interpolates is not groomed, and stays as it is
   if (world.interpolated) {
     append(held, groom, desc, world.interpolated->all);
     world.interpolated->interpolation.add(strands, held.guides,
                                           desc.interpolate ? desc.interpolate->neighbours : 1);
   }
-  if (desc.interpolate) held = select(held, held.guides);
-  if (strands.size() == 0)
-    throw Error(ErrorKind::kInput, desc.interpolate->pointer,
-                "every guide starts inside the head and was pruned",
-                "choose other guides, or use \"penetration\": \"push_out\"");
-  std::vector<std::int32_t> counts;
-  for (std::size_t s = 0; s < strands.size(); ++s) counts.push_back(strands.count(s));
-  if (!scene.effects.grooming.empty()) strands = with_room(scene, desc, strands);
+  if (desc.interpolate) {
+    held = select(held, held.guides);
+    counts = counts_of(strands);
+  }
   world.living.insert(world.living.end(), counts.begin(), counts.end());
   world.skin.triangles.insert(world.skin.triangles.end(), held.skin.begin(), held.skin.end());
   if (scales_stiffness) append_stiffness(scene, desc, strands, counts, world.stiffness);
   append(held, groom, desc, world.simulated);
 }
 
-// The most guides that a strand follows; 0 where no groom interpolates.
+// The most guides that a strand follows; 0 where none is to follow any.
 int most_neighbours(const scene::Scene& scene) {
   int most = 0;
+  if (scene.cache.strands == scene::StoredStrands::kGuides) return most;
   for (const scene::Groom& groom : scene.grooms)
     if (groom.interpolate) most = std::max(most, groom.interpolate->neighbours);
   return most;

@@ -23,7 +23,7 @@ struct StrandSet {
   std::unique_ptr<Roots> roots;
 };
 
-// All strands of a scene that interpolates.
+// All strands of a scene whose cache is to hold followers.
 struct Interpolated {
   StrandSet all;
   groom::Interpolation interpolation;

@@ -217,3 +217,43 @@ def test_a_trim_that_leaves_nothing_names_itself_and_keeps_earlier_frames(progra
 def test_operations_that_cannot_be_are_refused_before_the_run(program, scene, tmp_path, operation, expected):
     result = run(program, scene, tmp_path / "out", *grooming(operation))
     assert result.returncode == 3 and expected in result.stderr and not (tmp_path / "out").exists()
+
+
+SOFT = {"curve": [[0.02, 0.02], [0.1, 0.05]]}  # breaks early
+
+
+@pytest.mark.parametrize("operation", [{"comb": {"curve": [[-1, 0.2, 0], [1, 0.2, 0]], "radius": 1}}, {"rest": {}}])
+def test_no_operation_heals_what_is_broken(program, scene, tmp_path, operation):
+    options = setting("/effects/non_hookean", SOFT) + setting("/cache/fields", ["position", "elongation"])
+    options += setting("/effects/wind", {"velocity": [8, 0, 0]})
+    out = tmp_path / "out"
+    assert run(program, scene, out, *options, *grooming({"frame": 5, **operation})).returncode == 0
+    with h5py.File(out / "tiny.h5") as cache:
+        elongation = cache["elongation"][:]
+    assert np.mean(elongation[3] > 0.1) > 0.3  # broken before
+    assert (np.diff(elongation, axis=0) >= 0).all()
+
+
+def test_a_comb_that_hardly_touches_moves_nothing(program, scene, tmp_path):
+    """Whatever the head's pose: what hair bears is not combed into its rest shape."""
+    turned = setting("/head/animation/keys", [{"frame": 1}, {"frame": 9, "rotate": [0, 0, 0.7071, 0.7071]}])
+    options = [*turned, *setting("/frames/last", 100), *setting("/model/drag", 4)]
+    comb = {"curve": [[-1, 0.2, 0], [1, 0.2, 0]], "radius": 1, "strength": 1e-9}
+    combed = Groomed(program, scene, tmp_path / "combed", *options, *grooming({"frame": 60, "comb": comb}))
+    alone = Groomed(program, scene, tmp_path / "alone", *options, *grooming({"frame": 60, "trim": {"length": 1}}))
+    np.testing.assert_allclose(combed.position[-1], alone.position[-1], atol=2e-6)
+
+
+def test_a_comb_leaves_the_clamped_segment(program, scene, tmp_path):
+    clamped = setting("/model/clamped_particles", 2) + setting("/head/animation/keys", [])
+    comb = {"curve": [[-1, 0.2, 0], [1, 0.2, 0]], "radius": 1}
+    combed = Groomed(program, scene, tmp_path / "out", *clamped, *grooming({"frame": 3, "comb": comb}))
+    second = combed.offsets[:-1] + 1
+    np.testing.assert_array_equal(combed.position[:, second], np.broadcast_to(combed.position[0, second], (LAST, STRANDS, 3)))
+    assert np.abs(combed.position[-1] - combed.position[0]).max() > 0.01
+
+
+def test_a_length_of_another_unit_is_refused(program, scene, tmp_path):
+    result = run(program, scene, tmp_path / "out", *grooming({"frame": 3, "lengthen": {"by": 1000}}))
+    assert result.returncode == 3 and "particles, expected at most 16384" in result.stderr
+    assert not (tmp_path / "out").exists()

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from scenes import run, setting
-from tiny import PARTICLES, STRANDS, frame_bytes, write_scene
+from tiny import PARTICLES, STRANDS, data_bytes, frame_bytes, strands, write_scene
 
 COUNT = 40
 
@@ -29,9 +29,9 @@ def both(program, scene, tmp_path_factory):
         yield cache
 
 
-def particles_of(cache, strands):
+def particles_of(cache, chosen):
     offsets = cache["strands/offsets"][:]
-    return np.concatenate([np.arange(offsets[s], offsets[s + 1]) for s in strands])
+    return np.concatenate([np.arange(offsets[s], offsets[s + 1]) for s in chosen])
 
 
 def test_all_strands_are_stored_and_the_guides_once_more_by_themselves(both):
@@ -59,8 +59,8 @@ def test_weights_sum_to_1_and_a_guide_follows_itself(both):
 
 
 def test_the_cache_holds_the_strands_that_are_asked_for(program, scene, both, tmp_path):
-    for strands in ("guides", "all"):
-        assert run(program, scene, tmp_path / strands, *guides(), *setting("/cache/strands", strands)).returncode == 0
+    for stored in ("guides", "all"):
+        assert run(program, scene, tmp_path / stored, *guides(), *setting("/cache/strands", stored)).returncode == 0
     with h5py.File(tmp_path / "guides/tiny.h5") as cache:
         np.testing.assert_array_equal(cache["position"][:], both["guides/position"][:])
         assert "interpolation" not in cache and "guides" not in cache
@@ -153,3 +153,75 @@ def test_guides_that_do_not_exist_are_named(program, scene, tmp_path, interpolat
     result = run(program, scene, tmp_path / "out", *setting("/groom/interpolate", interpolate))
     assert result.returncode == 3 and expected in result.stderr
     assert not (tmp_path / "out").exists()
+
+
+# ---- beside another groom that is groomed --------------------------------------------------------------
+
+HAIR = {"name": "hair", "file": "groom.data", "attach": "nearest", "interpolate": {"count": COUNT}}
+BEARD = {"name": "beard", "file": "groom.data", "attach": "nearest"}
+
+
+@pytest.mark.parametrize("stored", ["all", "guides", "both"])
+@pytest.mark.parametrize("order", [[HAIR, BEARD], [BEARD, HAIR]], ids=["hair first", "beard first"])
+def test_a_groom_is_lengthened_beside_one_that_interpolates(program, scene, tmp_path, order, stored):
+    grooms = setting("/groom", order) + setting("/cache/strands", stored)
+    longer = setting("/effects/grooming", [{"frame": 3, "groom": "beard", "lengthen": {"by": 0.05}}])
+    for name, options in (("plain", []), ("longer", longer)):
+        result = run(program, scene, tmp_path / name, *grooms, *options)
+        assert result.returncode == 0, result.stderr
+    with h5py.File(tmp_path / "plain/tiny.h5") as plain, h5py.File(tmp_path / "longer/tiny.h5") as cache:
+        beard = order.index(BEARD)
+        before, after = plain["strands/offsets"][:], cache["strands/offsets"][:]
+        assert len(before) == len(after)
+        living = cache["living"][:]
+        assert (living <= np.diff(after)).all() and (living[:2] == np.diff(before)).all()
+        for strand, groom in enumerate(cache["strands/groom"][:]):
+            room, had = after[strand + 1] - after[strand], before[strand + 1] - before[strand]
+            assert (room > had) == (groom == beard)
+            frames = slice(0, 2) if groom == beard else slice(None)  # hair never notices
+            np.testing.assert_array_equal(
+                cache["position"][frames, after[strand] : after[strand] + had],
+                plain["position"][frames, before[strand] : before[strand + 1]],
+            )
+        if stored == "both":
+            assert cache["guides/position"].shape[1] == cache["guides/offsets"][-1]
+            assert np.isfinite(cache["guides/position"][:]).all()
+
+
+def test_guides_that_are_all_pruned_are_an_error(program, tmp_path):
+    """Strand 0 alone is a guide, and grows into the head."""
+    hair = strands()
+    hair[0] = 2 * hair[0, :1] - hair[0]
+    scene = write_scene(tmp_path, groom=data_bytes(hair))
+    chosen = setting("/groom/penetration", "prune") + setting("/groom/interpolate", {"strands": [0]})
+    result = run(program, scene, tmp_path / "out", *chosen)
+    assert result.returncode == 3 and "/groom/interpolate: every guide starts inside the head" in result.stderr
+
+
+def test_nothing_moves_in_the_first_frame(program, scene, tmp_path):
+    away = setting("/head/animation/keys", [{"frame": 1, "translate": [1, 0, 0]}, {"frame": 5, "translate": [1, 0, 1]}])
+    fixed = setting("/head", None) + setting("/groom/attach", "fixed") + setting("/effects/solids", [])
+    fixed += setting("/groom/animation/keys", [{"frame": 1, "translate": [1, 0, 0]}])
+    fields = setting("/cache/fields", ["position", "velocity"])
+    for name, options in (("head", away), ("fixed", fixed)):
+        assert run(program, scene, tmp_path / name, *guides(), *options, *fields, "--frames", "1-2").returncode == 0
+        with h5py.File(tmp_path / name / "tiny.h5") as cache:
+            assert (cache["velocity"][0] == 0).all()
+            assert np.isfinite(cache["velocity"][1]).all()
+
+
+def test_at_a_kink_followers_have_the_velocity_that_guides_have(program, scene, tmp_path):
+    """The head goes at 6 m/s and stops at frame 3: what its roots then have is the last substep's."""
+    keys = [{"frame": 1}, {"frame": 3, "translate": [0.5, 0, 0]}]
+    kink = setting("/head/animation", {"keys": keys, "interpolation": "linear"})
+    fields = setting("/cache/fields", ["position", "velocity"])
+    assert run(program, scene, tmp_path / "out", *guides(), *kink, *fields).returncode == 0
+    with h5py.File(tmp_path / "out/tiny.h5") as cache:
+        roots = cache["velocity"][2][cache["strands/offsets"][:-1]]
+    np.testing.assert_allclose(roots, np.broadcast_to([6, 0, 0], roots.shape), atol=1e-4)
+
+
+def test_a_cache_of_guides_makes_no_followers(program, scene):
+    command = [program, "plan", scene, "--json", *guides(), *setting("/cache/strands", "guides")]
+    planned = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+    assert planned["strands"] == COUNT and "interpolation" in planned["absent"]

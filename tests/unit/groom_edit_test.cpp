@@ -386,6 +386,33 @@ TEST(GroomComb, KeepsTheRestLengthsOfAStrandThatIsStretched) {
 }
 
 // Out of reach the shape is turned as a whole: its angles are what they were.
+// What a strand bears is not combed into its rest shape: a comb that hardly touches hardly changes it.
+TEST(GroomComb, TurnsTheRestShapeAsThePresentOneTurns) {
+  EditedStrand strand = at_rest(helix(20));
+  for (std::size_t i = 1; i < strand.position.size(); ++i) strand.position[i].x() += 0.02 * i;  // blown aside
+  strand.rotation = Quat(0.3, 0.5, -0.7, 0.2).normalized().toRotationMatrix();
+  const std::vector<Vec3> before = strand.rest;
+  for (const double strength : {1e-3, 1e-6, 1e-9}) {
+    strand.rest = before;
+    ASSERT_TRUE(apply(strand, scene::Comb{{Vec3::Zero(), Vec3::UnitX()}, 1, strength}));
+    double most = 0;
+    for (std::size_t i = 0; i < before.size(); ++i)
+      most = std::max(most, (strand.rest[i] - before[i]).norm());
+    EXPECT_LE(most, 11 * strength)
+        << "19 segments, 17 cm in all, each turned by strength times half a turn at most";
+    EXPECT_GT(most, 1e-3 * strength);
+  }
+}
+
+TEST(GroomComb, LeavesThePrescribedSegment) {
+  EditedStrand strand = at_rest(helix(20));
+  strand.held = 2;
+  const std::vector<Vec3> before = strand.rest;
+  ASSERT_TRUE(apply(strand, scene::Comb{{Vec3::Zero(), Vec3::UnitX()}, 1, 1}));
+  EXPECT_EQ(strand.rest[1], before[1]);
+  EXPECT_GT((strand.rest[2] - before[2]).norm(), 1e-4);
+}
+
 TEST(GroomComb, CarriesWhatFollowsAsItIs) {
   const Points before = helix(40);
   EditedStrand strand = at_rest(before);

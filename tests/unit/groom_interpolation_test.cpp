@@ -225,6 +225,46 @@ TEST(OneGuide, BentToAnArcTakesItsFollowerToTheConcentricOne) {
   EXPECT_LE(before, 1e-3);
 }
 
+// The same guide and a follower a fifth as long: it lies along the arc's beginning and keeps its length.
+TEST(OneGuide, ThatIsLongerCarriesAShortFollowerByItsBeginning) {
+  constexpr int kGuide = 61, kFollower = 13;
+  const double length = 0.3, beside = 0.02, radius = length / (0.5 * M_PI);
+  Strands strands;
+  const auto grow = [&](double x, int n, double of) {
+    for (int i = 0; i < n; ++i) strands.points.emplace_back(x, -of * i / (n - 1), 0);
+    strands.offsets.push_back(static_cast<std::int64_t>(strands.points.size()));
+  };
+  grow(0, kGuide, length), grow(beside, kFollower, length / 5);
+  Interpolation interpolation(1);
+  interpolation.add(strands, std::vector<unsigned char>{1, 0}, 1);
+  const auto arc = [&](double r, double angle) {
+    return Vec3(radius - r * std::cos(angle), -r * std::sin(angle), 0);
+  };
+  std::vector<Vec3> bent, expected;
+  for (int i = 0; i < kGuide; ++i) bent.push_back(arc(radius, 0.5 * M_PI * i / (kGuide - 1)));
+  for (int i = 0; i < kFollower; ++i)
+    expected.push_back(arc(radius - beside, 0.1 * M_PI * i / (kFollower - 1)));
+  std::vector<Vec3> out(kGuide + kFollower);
+  interpolation.follow({bent, std::vector<Mat3>{Mat3::Identity()}},
+                       std::vector<Vec3>{Vec3::Zero(), {beside, 0, 0}}, out);
+  EXPECT_LE(deviation({out.begin() + kGuide, out.end()}, expected), 5e-4);
+}
+
+TEST(OneGuide, ThatIsShorterCarriesWhatIsBeyondItsTipRigidly) {
+  Strands strands;
+  for (const int n : {3, 6}) {
+    for (int i = 0; i < n; ++i) strands.points.emplace_back(0, -0.1 * i, 0);
+    strands.offsets.push_back(static_cast<std::int64_t>(strands.points.size()));
+  }
+  Interpolation interpolation(1);
+  interpolation.add(strands, std::vector<unsigned char>{1, 0}, 1);
+  const std::vector<Vec3> bent = {
+      {0, 0, 0}, {0, -0.1, 0}, {0.1, -0.1, 0}};  // its last segment by a right angle
+  std::vector<Vec3> out(9);
+  interpolation.follow({bent, std::vector<Mat3>{Mat3::Identity()}}, std::vector<Vec3>(2, Vec3::Zero()), out);
+  for (int i = 0; i < 4; ++i) EXPECT_LE((out[5 + i] - Vec3(0.1 + 0.1 * i, -0.1, 0)).norm(), 1e-15) << i;
+}
+
 TEST(OneGuide, OfAnyKindOfStrandIsFollowedWithoutNaN) {
   Strands strands;
   const std::vector<std::vector<Vec3>> shapes = {

@@ -70,7 +70,12 @@ void Grooming<T>::apply(const scene::GroomingOperation& operation, const groom::
 
 template <class T>
 groom::EditedStrand Grooming<T>::read(std::size_t strand, const Pose& root) const {
-  groom::EditedStrand edited{model_.shape(strand), {}, {}, root.rotation, spacing_[strand]};
+  groom::EditedStrand edited{model_.shape(strand),
+                             {},
+                             {},
+                             root.rotation,
+                             spacing_[strand],
+                             static_cast<std::size_t>(scene_.model.clamped_particles)};
   const auto vector = [&](const state::AlignedVector<T>& array, int i) {
     const auto at = [&](int c) { return static_cast<double>(array[model_.layout.at(strand, i, 3, c)]); };
     return Vec3(at(0), at(1), at(2));
@@ -104,11 +109,9 @@ void Grooming<T>::write(std::size_t strand, const groom::EditedStrand& edited,
     if (k >= before.velocity.size() || edited.velocity[k] != before.velocity[k])
       put(state_.velocity, i, edited.velocity[k]);
   }
-  const bool reshaped = std::holds_alternative<scene::Comb>(operation.what) ||
-                        std::holds_alternative<scene::Rest>(operation.what);
-  // A new rest shape has no history, nor have particles that are new.
+  // What hair has suffered it keeps, whatever its new shape; particles that are new have suffered nothing.
   for (int i = 0; i < room && !state_.elongation.empty(); ++i)
-    if (reshaped || static_cast<std::size_t>(i) >= std::min(n, before.position.size()))
+    if (static_cast<std::size_t>(i) >= std::min(n, before.position.size()))
       state_.elongation[model_.layout.at(strand, i, 1, 0)] = T(0);
   if (std::holds_alternative<scene::Rest>(operation.what) && scene_.model.preload && scene_.effects.gravity)
     model_.set_preload(strand, *scene_.effects.gravity, edited.rotation);

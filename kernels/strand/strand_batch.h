@@ -17,7 +17,7 @@ inline constexpr int kLanes = 16;
 
 enum Coupling { kEdge, kBend, kTwist, kIntegrity, kAngular, kCouplings };
 
-// Constant over a run.
+// Constant over a frame. Grooming edits count, rest, rest_length, preload and per_length between frames.
 template <class T>
 struct StrandBatches {
   std::int32_t batches;
@@ -27,7 +27,8 @@ struct StrandBatches {
   const T* rest_length;     // [rows][3] rest distance to the next, second next and third next particle [m]
   const T*
       stiffness;     // [rows][kCouplings] [1/s^2], or null where StrandParameters::stiffness holds everywhere
-  const T* preload;  // [batches][3] -g in the strand's root frame at the first frame [m/s^2]; 0: no preload
+  const T* preload;  // [batches][3] -g in the strand's root frame at the first frame, or when grooming last
+                     // made its present shape the rest shape [m/s^2]; 0: no preload
   const T* rest_companion;  // [rows][3] mass-spring: rest place of the companion of the segment that begins
                             // there, as `rest` [m]; null for AMS
   const T* per_length;  // [batches] 1 / L, L the strand's rest length, 0 for one without [1/m]; or null where

@@ -1,4 +1,5 @@
-// The strands of a run: what is constant (Model) and what changes (State), in the solver's precision T.
+// The strands of a run, in the solver's precision T: what they are made of (Model), which only grooming
+// edits, between frames, and what the solver moves (State).
 #pragma once
 #include <tbb/cache_aligned_allocator.h>
 

@@ -242,15 +242,6 @@ class Run:
             whole[self.tips] = False
         return np.where(whole & (self.rest_lengths > 0), length / np.maximum(self.rest_lengths, 1e-30) - 1, 0)
 
-    def kinetic_energy(self, frame):
-        """Mean over particles, per unit mass [J/kg]. Needs `velocity` in cache.fields."""
-        return 0.5 * float((self.field("velocity", frame) ** 2).sum(1).mean())
-
-    def potential_energy(self, frame):
-        """Of gravity, mean over particles, per unit mass, 0 in the first frame [J/kg]."""
-        gravity = np.array(self.scene["effects"].get("gravity", [0, 0, 0]))
-        return float(-((self.position(frame) - self.position(self.frames[0])) @ gravity).mean())
-
     def speeds(self, frame):
         """[particles] Needs `velocity` in cache.fields."""
         return np.linalg.norm(self.field("velocity", frame), axis=1)

@@ -20,7 +20,7 @@ def few_strands():
 def make(figures):
     full = figures.run("wig")
     few = figures.run("wig", "wig_1024", few_strands())
-    still = figures.run("wig", "wig_still", {**few_strands(), "/effects/wind": None})
+    still = figures.run("wig", "wig_still", {"/effects/wind": None})
     camera = pictures.shared_camera([(full, frame) for frame in FRAMES], (20, 8), figures.size(250))
     rows = [
         pictures.strip(run, FRAMES, camera, f"{len(run.roots):,}, frame", **figures.look) for run in (few, full)

@@ -17,6 +17,7 @@ VARIANTS = {
 SCHEMES = ["projected", "paper"]
 QUIET = 900  # the last frame of the comparisons: 23 s after the ride, since torn hair swings for long
 TRANSITION, BREAK = 0.5, 1.0  # of the schema's curve
+BEFORE, FLOATING = 56, 76  # frames: before the drop lifts the hair, and while it does
 ARRIVED = 339  # the frame of the last key
 
 
@@ -48,13 +49,19 @@ def ride(figures, variant, scheme, strands=FEW):
 
 
 def residual(one):
-    """What is left of the style: deviation in the last frame over strand length, how still the hair is, and the share
-    of particles that went beyond the transition and the break of the curve during the ride."""
+    """What is left of the style: deviation over strand length in the drop, on arrival and in the last frame, how still
+    the hair is, and the share of particles that went beyond the transition and the break of the curve during the ride."""
+
+    def mean(frame):
+        return one.deviation(min(frame, one.frames[-1])).mean()
+
     farthest = np.max([one.deviation(frame) for frame in one.frames], axis=0)
     away = one.deviation(one.frames[-1])
     return {
         "diverged_frame": one.diverged_frame,
-        "arrival_mean": one.deviation(min(ARRIVED, one.frames[-1])).mean(),
+        "before_the_drop_mean": mean(BEFORE),
+        "in_the_drop_mean": mean(FLOATING),
+        "arrival_mean": mean(ARRIVED),
         "end_mean": away.mean(),
         "end_tips_mean": away[one.tips].mean(),
         "end_largest": away.max(),
@@ -66,14 +73,27 @@ def residual(one):
     }
 
 
-def felt(one):
-    """[frames] what the rider feels, in g: from the keys, a frame apart."""
+def track(one):
+    """The way of the keys, from standing to standing."""
+    keys = one.scene["motion"]["keys"]
+    at = np.array([key["translate"] for key in keys])
+    return {
+        "length_m": np.linalg.norm(np.diff(at, axis=0), axis=1).sum(),
+        "height_m": np.ptp(at[:, 1]),
+        "seconds": (keys[-1]["frame"] - keys[0]["frame"]) / one.scene["frames"]["fps"],
+        "felt_g_largest": felt(one).max(),
+        "felt_g_largest_10_times_as_fast": felt(one, 10).max(),
+    }
+
+
+def felt(one, speed=1):
+    """[frames] what the rider feels, in g: from the keys, a frame apart; or of a ride so many times as fast."""
     frames, keys = np.array(one.frames), one.scene["motion"]["keys"]
     when = [key["frame"] for key in keys]
     at = np.stack([np.interp(frames, when, [key["translate"][k] for key in keys]) for k in range(3)], axis=1)
     fps = one.scene["frames"]["fps"]
     acceleration = np.gradient(np.gradient(at, 1 / fps, axis=0), 1 / fps, axis=0)
-    return np.linalg.norm(acceleration + [0, 9.81, 0], axis=1) / 9.81
+    return np.linalg.norm(speed**2 * acceleration + [0, 9.81, 0], axis=1) / 9.81
 
 
 def pictured(figures, runs):
@@ -115,7 +135,7 @@ def make(figures):
     figures.record(
         {
             "full": full.health([1, 72, 141, 205, 287, 330, 420]) | residual(full),
-            "felt_g_largest": felt(full).max(),
+            "track": track(full),
             "strands_compared": FEW,
             "compared": {
                 f"{variant}, {scheme}": residual(one) for scheme in SCHEMES for variant, one in runs[scheme].items()

@@ -6,10 +6,10 @@
 
 #include <algorithm>
 #include <limits>
-#include <nanoflann.hpp>
 #include <numeric>
 
 #include "core/error.h"
+#include "groom/root_tree.h"
 
 namespace ringlet::groom {
 
@@ -110,21 +110,6 @@ std::vector<double> arc_lengths(std::span<const Vec3> points) {
   for (std::size_t i = 1; i < points.size(); ++i) at[i] = at[i - 1] + (points[i] - points[i - 1]).norm();
   return at;
 }
-
-// The guides' roots as nanoflann sees them.
-struct RootCloud {
-  std::vector<Vec3> roots;
-  std::size_t kdtree_get_point_count() const { return roots.size(); }
-  double kdtree_get_pt(std::size_t i, std::size_t axis) const {
-    return roots[i][static_cast<Eigen::Index>(axis)];
-  }
-  template <class Box>
-  bool kdtree_get_bbox(Box&) const {
-    return false;
-  }
-};
-using RootTree =
-    nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, RootCloud>, RootCloud, 3>;
 
 }  // namespace
 

@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nanoflann.hpp>
 #include <numbers>
 #include <numeric>
+
+#include "groom/root_tree.h"
 
 namespace ringlet::groom {
 namespace {
@@ -29,30 +30,17 @@ std::optional<double> curvature(const Vec3& before, const Vec3& after) {
   return std::atan2(before.cross(after).norm(), before.dot(after)) / ((a + b) / 2);
 }
 
-struct RootCloud {
-  std::vector<Vec3> points;
-  std::size_t kdtree_get_point_count() const { return points.size(); }
-  double kdtree_get_pt(std::size_t point, std::size_t axis) const {
-    return points[point][static_cast<Eigen::Index>(axis)];
-  }
-  template <class Box>
-  bool kdtree_get_bbox(Box&) const {
-    return false;
-  }
-};
-
 std::optional<double> root_density(const Strands& strands) {
   constexpr std::size_t kNeighbours = 8;
   // pi n r^2 of the k-th neighbour of points at random has a gamma distribution; its median is near k - 1/3.
   constexpr double kInCircle = kNeighbours - 1.0 / 3;
   if (strands.size() <= kNeighbours) return {};
   RootCloud cloud;
-  for (std::size_t s = 0; s < strands.size(); ++s) cloud.points.push_back(strands.points[strands.offsets[s]]);
-  using Distance = nanoflann::L2_Simple_Adaptor<double, RootCloud>;
-  const nanoflann::KDTreeSingleIndexAdaptor<Distance, RootCloud, 3, std::size_t> tree(3, cloud);
+  for (std::size_t s = 0; s < strands.size(); ++s) cloud.roots.push_back(strands.points[strands.offsets[s]]);
+  const RootTree tree(3, cloud);
   std::vector<double> densities;
-  for (const Vec3& root : cloud.points) {
-    std::array<std::size_t, kNeighbours + 1> nearest;  // the root itself is one of them
+  for (const Vec3& root : cloud.roots) {
+    std::array<std::uint32_t, kNeighbours + 1> nearest;  // the root itself is one of them
     std::array<double, kNeighbours + 1> squared;
     tree.knnSearch(root.data(), nearest.size(), nearest.data(), squared.data());
     densities.push_back(kInCircle / (std::numbers::pi * squared.back()));

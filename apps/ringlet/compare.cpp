@@ -40,6 +40,7 @@ Report json_of(const Comparison& result, const CompareOptions& options, const st
   if (!result.topology.empty()) report["topology"] = result.topology;
   report["only_a"] = result.only_a;
   report["only_b"] = result.only_b;
+  report["other_living"] = result.living;
   if (!result.frames.empty()) {
     report["overall"] = json_of(result.overall);
     report["overall"]["frame"] = result.worst_frame;
@@ -87,6 +88,8 @@ void print_text(const Comparison& result, const CompareOptions& options, const s
   if (!result.topology.empty()) std::printf("other strands: %s\n", result.topology.c_str());
   if (!result.only_a.empty()) std::printf("frames only in A: %s\n", ranges(result.only_a).c_str());
   if (!result.only_b.empty()) std::printf("frames only in B: %s\n", ranges(result.only_b).c_str());
+  if (!result.living.empty())
+    std::printf("other living particles in frames: %s\n", ranges(result.living).c_str());
   if (result.topology.empty() && result.frames.empty()) std::printf("no frame in common\n");
   if (options.exact) {
     std::printf("%s\n", result.same ? "identical" : "not identical");

@@ -14,18 +14,26 @@ namespace ringlet::app {
 int run_groom_grow(const GroomGrowOptions& options) {
   check_output(options.output);
   const scene::Scene scene = scene::load(options.scene, {options.overrides});
+  std::vector<const scene::Groom*> growing;
+  std::string names;
   for (const scene::Groom& desc : scene.grooms) {
     if (!desc.grow || (options.groom && *options.groom != desc.name)) continue;
-    const solids::AnimatedMesh head(*scene.head, scene.units, scene.frames);
-    const groom::Scalp scalp{head.rest_vertices(), head.triangles(), head.mesh_of_triangle(),
-                             head.mesh_names()};
-    write_groom(options.output, groom::build(desc, scene.units, &scalp), scene.units.up);
-    return 0;
+    growing.push_back(&desc);
+    names += (names.empty() ? "" : ", ") + desc.name;
   }
-  throw Error(ErrorKind::kUsage, options.scene,
-              options.groom ? fmt::format("no groom `{}` with a \"grow\" block", *options.groom)
-                            : std::string("no groom with a \"grow\" block"),
-              "name one that grows");
+  if (growing.empty())
+    throw Error(ErrorKind::kUsage, options.scene,
+                options.groom ? fmt::format("no groom `{}` with a \"grow\" block", *options.groom)
+                              : std::string("no groom with a \"grow\" block"),
+                "name one that grows");
+  if (growing.size() > 1)
+    throw Error(ErrorKind::kUsage, options.scene, fmt::format("{} grooms grow: {}", growing.size(), names),
+                "choose one with --groom");
+  const solids::AnimatedMesh head(*scene.head, scene.units, scene.frames);
+  const groom::Scalp scalp{head.rest_vertices(), head.triangles(), head.mesh_of_triangle(),
+                           head.mesh_names()};
+  write_groom(options.output, groom::build(*growing[0], scene.units, &scalp), scene.units.up);
+  return 0;
 }
 
 int run_groom_convert(const GroomFileOptions& options) {

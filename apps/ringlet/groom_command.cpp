@@ -18,7 +18,11 @@ void add_files(CLI::App& command, GroomFileOptions& files) {
                   "of the input where it declares none, and of all lengths given here: m, cm, mm, in, ft or "
                   "metres; m by default")
       ->option_text("UNIT");
-  command.add_option("--up", files.up, "up axis: the file's own by default, y where it declares none")
+  command
+      .add_option(
+          "--up", files.up,
+          "up axis of what is written and of all places given here: the file's own by default, y where it "
+          "declares none")
       ->option_text("x/y/z");
 }
 

@@ -227,7 +227,9 @@ Report measures_of(const groom::Strands& strands) {
 }
 
 Report describe_groom(const InfoOptions& options) {
-  const groom::Strands strands = groom::read(options.file, {}, {}, kMetres);
+  scene::Units units = kMetres;
+  units.up = groom::declared_units(options.file).up.value_or(units.up);
+  const groom::Strands strands = groom::read(options.file, {}, {}, units);
   const auto at = [&](std::size_t i) { return strands.points[i]; };
   Report report = {{"kind", "groom"}, {"strands", strands.size()}, {"particles", strands.particles()}};
   report["particles_per_strand"] = particles_per_strand(strands.offsets);
@@ -237,6 +239,8 @@ Report describe_groom(const InfoOptions& options) {
   report["units"] = {{"length", declares ? "m" : "the file's own: its format declares none"},
                      {"curvature", "1/" + unit},
                      {"root_density", "roots/" + unit + "^2"}};
+  if (declares)
+    report["units"]["up"] = units.up == scene::Axis::kX ? "x" : units.up == scene::Axis::kY ? "y" : "z";
   report.update(measures_of(strands));
   report["widths"] = !strands.widths.empty();
   report["stored_roots"] = !strands.roots.empty();

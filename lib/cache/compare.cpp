@@ -105,6 +105,7 @@ void compare_frames(Comparison& result, const CacheReader& a, const CacheReader&
         statistics(distances_between(frame_a.position, frame_b.position, scale), a.header().offsets);
     result.frames.push_back({number, found, identical(frame_a, frame_b)});
     squares += found.rms * found.rms;
+    if (frame_a.living != frame_b.living) result.living.push_back(number);
 
     Distances& overall = result.overall;
     if (result.frames.size() == 1 || found.max > overall.max) {
@@ -137,7 +138,8 @@ Comparison compare(const CacheReader& a, const CacheReader& b, const CompareOpti
   const bool exact =
       std::all_of(result.frames.begin(), result.frames.end(), [](const auto& f) { return f.identical; });
   const bool within = options.exact ? exact : result.overall.max <= options.tolerance;
-  result.same = within && !both.empty() && result.only_a.empty() && result.only_b.empty();
+  result.same =
+      within && result.living.empty() && !both.empty() && result.only_a.empty() && result.only_b.empty();
   return result;
 }
 

@@ -40,10 +40,12 @@ struct Comparison {
   std::string topology;             // how the strands differ; empty: they do not, and frames were compared
   std::vector<int> only_a, only_b;  // frames that the other lacks
   std::vector<FrameComparison> frames;
-  int worst_frame = 0;  // with the largest distance; meaningful when `frames` is not empty
-  Distances overall;    // max, strand, particle, p99 of the worst frames; RMS over all
+  std::vector<int> living;  // frames in which strands have other numbers of living particles
+  int worst_frame = 0;      // with the largest distance; meaningful when `frames` is not empty
+  Distances overall;        // max, strand, particle, p99 of the worst frames; RMS over all
   std::vector<Difference> provenance;
-  bool same = false;  // within the tolerance (exact: identical), of the same frames, one at least
+  bool same = false;  // within the tolerance (exact: identical), of the same frames, one at least, and living
+                      // particles
 };
 
 // Throws Error{kInput} where a file cannot be read. Frames are read one at a time.

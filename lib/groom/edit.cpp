@@ -85,7 +85,8 @@ void edit(Strands& strands, const scene::GroomingOperation& operation, const Sig
     changed += edit(shapes[s], operation, cutter);
   });
   Strands all = assemble(strands, shapes);
-  check_something_is_left(all, strands.size(), operation.pointer);
+  if (std::holds_alternative<scene::Trim>(operation.what))
+    check_something_is_left(all, strands.size(), operation.pointer);
   log_info(fmt::format("{}: {} of {} strands changed, {} are gone", operation.pointer, changed.load(),
                        strands.size(), strands.size() - all.size()));
   strands = std::move(all);

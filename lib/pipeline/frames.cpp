@@ -4,6 +4,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cmath>
 
 namespace ringlet::pipeline {
 namespace {
@@ -117,6 +118,24 @@ std::vector<Vec3> follow_velocities(const scene::Scene& scene, const World& worl
   return out;
 }
 
+// How much longer than at rest the segments of followers are: guides keep their lengths, what follows them
+// need not.
+state::Figures follower_figures(const World& world, const std::vector<Vec3>& now) {
+  const groom::Strands& all = world.interpolated->all.strands;
+  std::vector<double> strains;
+  for (std::size_t s = 0; s < all.size(); ++s)
+    for (auto i = all.offsets[s]; i + 1 < all.offsets[s + 1]; ++i)
+      if (const double rest = (all.points[i + 1] - all.points[i]).norm(); rest > 0)
+        strains.push_back(std::abs((now[i + 1] - now[i]).norm() / rest - 1));
+  if (strains.empty()) return {};
+  const auto high =
+      strains.begin() + static_cast<std::ptrdiff_t>(0.99 * static_cast<double>(strains.size() - 1));
+  std::nth_element(strains.begin(), high, strains.end());
+  const double p99 = *high;
+  return {{"edge_strain_all", *std::max_element(strains.begin(), strains.end())},
+          {"edge_strain_all_p99", p99}};
+}
+
 template <class T>
 void add_strands(const scene::Scene& scene, const World& world, const Simulated<T>& simulated,
                  state::Frame& frame) {
@@ -131,6 +150,7 @@ void add_strands(const scene::Scene& scene, const World& world, const Simulated<
   }
   const std::vector<Vec3> followed = follow(world, positions, frame.time);
   frame.position = in_units(followed, unit);
+  frame.figures = follower_figures(world, followed);
   if (scene.cache.strands == scene::StoredStrands::kBoth) frame.guide_position = in_units(positions, unit);
   if (velocity)
     frame.velocity = in_units(

@@ -9,8 +9,8 @@ namespace ringlet::pipeline {
 // Everything but the machine and the range of frames.
 state::RunHeader make_header(const scene::Scene& scene, const World& world);
 
-// Frame `number`, at `time` [s], without its figures. Of strands that are shorter than there is room for, the
-// particles beyond the tip lie on it.
+// Frame `number`, at `time` [s], without the solver's figures. Of strands that are shorter than there is room
+// for, the particles beyond the tip lie on it.
 template <class T>
 state::Frame make_frame(const scene::Scene& scene, const World& world, const state::StrandModel<T>& model,
                         const state::StrandState<T>& state, int number, double time);

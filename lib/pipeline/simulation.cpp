@@ -98,6 +98,7 @@ class TypedSimulation : public Simulation {
       stages_.push_back(effects::make_contact_stage<T>(scene_, world_.solids, world_.skin, model_, state_));
     if (!scene_.effects.grooming.empty())
       grooming_.emplace(scene_, world_.simulated.groom_of_strand, model_, state_);
+    if (grooming_ && scene_.frames.preroll == 0) rehearse_first_frame();
     make_plan();
   }
 
@@ -108,6 +109,7 @@ class TypedSimulation : public Simulation {
  private:
   void make_plan();
   void start();
+  void rehearse_first_frame();
   void resume(const state::Snapshot& snapshot);
   void groom(int frame);
   void renew_executor();
@@ -192,6 +194,15 @@ void TypedSimulation<T>::start() {
   roots_.pose(first_time(scene_.frames), now_);
   state::pose_at_rest<T>(state_, model_, now_);
   executor_->submit(state_);
+}
+
+// What the first frame's grooming cannot do is bad input, told before a cache is written or replaced.
+template <class T>
+void TypedSimulation<T>::rehearse_first_frame() {
+  start();
+  const state::StrandModel<T> model = model_;
+  grooming_->apply(scene_.frames.first, now_);
+  model_ = model;  // the run poses its state anew
 }
 
 template <class T>
@@ -280,7 +291,8 @@ bool TypedSimulation<T>::run(const FrameRange& range, state::FrameSink& sink, co
   StageSeconds seconds;
   const std::int64_t strand_steps = plan_.strands * plan_.substeps;
   const auto hand_on = [&](state::Frame out, double spent) {
-    out.figures = figures_of(report, strand_steps);
+    const state::Figures solver = figures_of(report, strand_steps);
+    out.figures.insert(out.figures.begin(), solver.begin(), solver.end());
     sink.write(std::move(out), save(frame, model_, state_, grooming_.has_value()), spent);
   };
   // Counted where the plan has such a stage.

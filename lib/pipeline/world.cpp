@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <numeric>
 
 #include "core/error.h"
 #include "core/log.h"
@@ -140,6 +141,10 @@ void clear_head(const scene::Scene& scene, const scene::Groom& desc, World& worl
                     "collide with it",
                     desc.name, report.buried));
   if (std::find(prune.begin(), prune.end(), 1) == prune.end()) return;
+  const auto lost = std::inner_product(prune.begin(), prune.end(), guides.begin(), std::int64_t{0});
+  if (desc.interpolate && lost > 0)
+    log_warning(
+        fmt::format("{}: {} guides start inside the head and are pruned", desc.interpolate->pointer, lost));
   for (unsigned char& mark : prune) mark = !mark;
   held = select(held, prune);
   if (strands.size() == 0)

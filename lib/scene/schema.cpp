@@ -78,7 +78,9 @@ std::string describe_words(const Json& words) {
 
 std::string describe_list(const Json& node, const std::string& item) {
   std::string count;
-  if (node.contains("maxItems"))
+  if (node.contains("maxItems") && node.value("minItems", 0) != node["maxItems"])
+    count = fmt::format(" of {} to {}", node.value("minItems", 0), node["maxItems"].get<int>());
+  else if (node.contains("maxItems"))
     count = fmt::format(" of {}", node["maxItems"].get<int>());
   else if (node.contains("minItems"))
     count = fmt::format(" of at least {}", node["minItems"].get<int>());

@@ -76,6 +76,10 @@ constexpr Case kSchemaCases[] = {
      R"(scene#/effects/gravity/1: found "down", expected a number from -1e+06 to 1e+06 [m/s^2])"},
     {R"({"cache": {"fields": ["position", "position"]}})",
      R"(scene#/cache/fields: found ["position","position"], expected a list, different, each "position", "velocity", "elongation" or "solids")"},
+    {R"({"effects": {"non_hookean": {"curve": []}}})",
+     "scene#/effects/non_hookean/curve: found [], expected a list of 1 to 16, each a list of 2, each a "
+     "number "
+     "above 0, at most 1e+06"},
     // if/then/else
     {R"({"groom": 5})", "scene#/groom: found 5, expected an object, or a list of at least 1, each an object"},
     {R"({"groom": [{"file": "a.hair", "attach": "glue"}]})",

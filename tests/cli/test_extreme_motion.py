@@ -1,4 +1,4 @@
-"""Motion at 1, 3 and 10 times its speed: the roller-coaster (at ten times 600 g and 190 m/s) and the default scene's
+"""Motion at 1, 3 and 10 times its speed: the roller-coaster (at ten times 620 g and 190 m/s) and the default scene's
 head, which turns to and fro. Runs end, lengths and speeds stay bounded, hair comes to rest once the motion stops."""
 import json
 

@@ -257,3 +257,25 @@ def test_a_length_of_another_unit_is_refused(program, scene, tmp_path):
     result = run(program, scene, tmp_path / "out", *grooming({"frame": 3, "lengthen": {"by": 1000}}))
     assert result.returncode == 3 and "particles, expected at most 16384" in result.stderr
     assert not (tmp_path / "out").exists()
+
+
+def test_a_first_frame_that_cannot_be_leaves_an_old_cache_alone(program, scene, tmp_path):
+    assert run(program, scene, tmp_path / "out").returncode == 0
+    before = frame_bytes(tmp_path / "out")
+    result = run(program, scene, tmp_path / "out", "--overwrite", *grooming({"frame": 1, "trim": {"length": 1e-6}}))
+    assert result.returncode == 3 and "leaves nothing" in result.stderr
+    assert frame_bytes(tmp_path / "out") == before
+
+
+def test_the_first_frame_can_be_groomed(program, scene, tmp_path):
+    cut = Groomed(program, scene, tmp_path / "out", *grooming({"frame": 1, "trim": {"length": 0.1}}))
+    assert (cut.lengths(1) < 0.1001).all() and (cut.living[0] == cut.living[-1]).all()
+
+
+def test_compare_minds_living_particles(program, scene, tmp_path):
+    Groomed(program, scene, tmp_path / "a", *grooming({"frame": 1, "trim": {"length": 0.1}}))
+    Groomed(program, scene, tmp_path / "b", *grooming({"frame": 1, "trim": {"length": 0.05}}))
+    compared = subprocess.run(
+        [program, "compare", tmp_path / "a", tmp_path / "b", "--tolerance", "10"], capture_output=True, text=True
+    )
+    assert compared.returncode == 1 and f"other living particles in frames: 1-{LAST}" in compared.stdout

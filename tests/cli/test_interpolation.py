@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from scenes import run, setting
-from tiny import PARTICLES, STRANDS, data_bytes, frame_bytes, strands, write_scene
+from tiny import PARTICLES, STRANDS, data_bytes, strands, write_scene
 
 COUNT = 40
 
@@ -80,7 +80,9 @@ def test_guides_move_as_if_they_were_alone(program, scene, both, tmp_path):
 def test_a_groom_of_guides_only_is_simulated_whole(program, scene, tmp_path):
     assert run(program, scene, tmp_path / "plain").returncode == 0
     assert run(program, scene, tmp_path / "all", *guides(STRANDS)).returncode == 0
-    assert frame_bytes(tmp_path / "all") == frame_bytes(tmp_path / "plain")
+    with h5py.File(tmp_path / "plain/tiny.h5") as plain, h5py.File(tmp_path / "all/tiny.h5") as followed:
+        np.testing.assert_array_equal(followed["position"][:], plain["position"][:])
+        np.testing.assert_array_equal(followed["figures/edge_strain_free"][:], plain["figures/edge_strain_free"][:])
 
 
 def test_rigid_motion_is_followed_exactly(program, scene, tmp_path):
@@ -225,3 +227,27 @@ def test_a_cache_of_guides_makes_no_followers(program, scene):
     command = [program, "plan", scene, "--json", *guides(), *setting("/cache/strands", "guides")]
     planned = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
     assert planned["strands"] == COUNT and "interpolation" in planned["absent"]
+
+
+def test_figures_tell_how_followers_stretch(both):
+    """Guides keep their lengths; of all strands the figures are those of the positions."""
+    rest, offsets = both["strands/rest_position"][:].astype(float), both["strands/offsets"][:]
+    inner = np.setdiff1d(np.arange(len(rest) - 1), offsets[1:-1] - 1)
+
+    def lengths(points):
+        return np.linalg.norm(np.diff(points, axis=0), axis=1)[inner]
+
+    for frame, position in enumerate(both["position"][:].astype(float)):
+        strain = np.abs(lengths(position) / lengths(rest) - 1)
+        assert both["figures/edge_strain_all"][frame] == pytest.approx(strain.max(), abs=2e-5)
+        assert both["figures/edge_strain_all_p99"][frame] == pytest.approx(np.percentile(strain, 99), rel=0.02, abs=2e-5)
+    assert both["figures/edge_strain_all"][-1] > 10 * both["figures/edge_strain_free"][-1]
+
+
+def test_guides_that_are_pruned_are_told_of(program, tmp_path):
+    hair = strands()
+    hair[0] = 2 * hair[0, :1] - hair[0]
+    scene = write_scene(tmp_path, groom=data_bytes(hair))
+    chosen = setting("/groom/penetration", "prune") + setting("/groom/interpolate", {"strands": [0, 9]})
+    result = run(program, scene, tmp_path / "out", *chosen)
+    assert result.returncode == 0 and "/groom/interpolate: 1 guides start inside the head and are pruned" in result.stderr

@@ -98,7 +98,7 @@ TEST_F(CacheTest, FollowersWeightsAndLivingParticlesComeBackToTheBit) {
   expect_same(failed.read(2), followed_frame(2));
 }
 
-TEST_F(CacheTest, AFrameOfOtherLivingParticlesIsNotIdentical) {
+TEST_F(CacheTest, AFrameOfOtherLivingParticlesIsNotTheSame) {
   for (const char* name : {"a", "b"}) {
     CacheWriter writer(directory_ / name, followed_header());
     state::Frame frame = followed_frame(1);
@@ -107,8 +107,12 @@ TEST_F(CacheTest, AFrameOfOtherLivingParticlesIsNotIdentical) {
     writer.finish();
   }
   const CacheReader a(directory_ / "a"), b(directory_ / "b");
-  EXPECT_FALSE(compare(a, b, {.exact = true}).same);
-  EXPECT_TRUE(compare(a, b, {.tolerance = 0}).same) << "the positions are the same";
+  for (const bool exact : {false, true}) {
+    const Comparison found = compare(a, b, {.tolerance = 1, .exact = exact});
+    EXPECT_FALSE(found.same);
+    EXPECT_THAT(found.living, ElementsAre(1));
+    EXPECT_EQ(found.overall.max, 0) << "the positions are the same";
+  }
 }
 
 TEST_F(CacheTest, GuidesThatNoStrandIsAreRefused) {

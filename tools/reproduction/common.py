@@ -73,6 +73,8 @@ def run_scene(scene, label, overrides=None, frames=None, work=WORK, options=()):
             command += ["--set", f"{pointer}={json.dumps(value)}"]
         print(f"figures: {label}", file=sys.stderr, flush=True)
         before = _child_seconds()
+        if not PROGRAM.exists():
+            raise RunError(f"{PROGRAM}: not built (run tools/build release ringlet)")
         result = subprocess.run([str(part) for part in command], capture_output=True, text=True, check=False)
         if result.returncode not in (0, DIVERGED):
             raise RunError(f"{label}: exit code {result.returncode}: {result.stderr.strip()}")

@@ -60,7 +60,7 @@ void Grooming<T>::apply(const scene::GroomingOperation& operation, const groom::
     }
     hair += model_.living(s) > 1;
   });
-  if (hair == 0)
+  if (hair == 0 && std::holds_alternative<scene::Trim>(operation.what))
     throw Error(ErrorKind::kInput, operation.pointer,
                 fmt::format("leaves nothing of any strand in frame {}, expected some hair", operation.frame),
                 "look at its place, its unit and which side it keeps; earlier frames are kept");

@@ -50,6 +50,9 @@ class Builder {
     if (effects.contains("inextensible")) scene.effects.inextensible = inextensible(effects["inextensible"]);
     if (effects.contains("non_hookean")) scene.effects.non_hookean = non_hookean(effects["non_hookean"]);
     if (effects.contains("wind")) scene.effects.wind = wind(effects["wind"]);
+    if (effects.contains("hair_hair")) scene.effects.hair_hair = hair_hair(effects["hair_hair"]);
+    if (!scene.effects.wind && scene.effects.hair_hair && scene.effects.hair_hair->grid)
+      scene.effects.hair_hair->grid->shelter.reset();  // from a wind that never blows
     if (effects.contains("grooming")) scene.effects.grooming = grooming(effects["grooming"]);
     for (std::size_t i = 0; i < effects["solids"].size(); ++i)
       scene.effects.solids.push_back(solid("/effects/solids" + pointer_token(i), effects["solids"][i]));
@@ -253,10 +256,28 @@ class Builder {
     return trim;
   }
 
+  static Cadence cadence(const Json& value) {
+    return word<Cadence>(value, {{"substep", Cadence::kSubstep}, {"frame", Cadence::kFrame}});
+  }
+
   static Inextensible inextensible(const Json& block) {
-    const auto cadence =
-        word<Cadence>(block["per"], {{"substep", Cadence::kSubstep}, {"frame", Cadence::kFrame}});
-    return {block["tolerance"], block["max_iterations"], cadence};
+    return {block["tolerance"], block["max_iterations"], cadence(block["per"])};
+  }
+
+  static HairHair hair_hair(const Json& block) {
+    HairHair hair_hair;
+    if (block.contains("grid")) {
+      const Json& grid = block["grid"];
+      hair_hair.grid = {grid["resolution"],       grid["pic"], grid["residual"], grid["max_iterations"],
+                        cadence(grid["cadence"]), {}};
+      if (grid.contains("shelter")) hair_hair.grid->shelter = grid["shelter"]["strength"].get<double>();
+    }
+    if (block.contains("contacts")) {
+      const Json& contacts = block["contacts"];
+      hair_hair.contacts = {contacts["friction"], contacts["passes"], cadence(contacts["cadence"]),
+                            optional<double>(contacts, "radius")};
+    }
+    return hair_hair;
   }
 
   static NonHookean non_hookean(const Json& block) {

@@ -61,6 +61,7 @@ class Checks {
     for (const auto& [pointer, groom] : grooms_of(document_)) check_groom(pointer, *groom);
     non_hookean();
     wind();
+    hair_hair();
     grooming();
     const Json& solids = document_["effects"]["solids"];
     for (std::size_t i = 0; i < solids.size(); ++i) solid("/effects/solids" + pointer_token(i), solids[i]);
@@ -180,6 +181,17 @@ class Checks {
               "a frame after the previous key's " + brief(wind["keys"][i - 1]["frame"]));
     if (wind.contains("shelter") && !has_head())
       add("/effects/wind/shelter", "shelter without a head", "a head in the scene");
+  }
+
+  void hair_hair() {
+    const Json& effects = document_["effects"];
+    if (!effects.contains("hair_hair")) return;
+    const Json& block = effects["hair_hair"];
+    if (!block.contains("grid") && !block.contains("contacts"))
+      add("/effects/hair_hair", "neither grid nor contacts", "one of them, or both",
+          "{} takes the defaults of either");
+    if (block.contains("grid") && block["grid"].contains("shelter") && !effects.contains("wind"))
+      add("/effects/hair_hair/grid/shelter", "shelter without a wind", "effects.wind in the scene");
   }
 
   // Exactly one of `keys` stands in the block.

@@ -222,6 +222,29 @@ struct Wind {
   double linear_density;  // [kg/m]
 };
 
+// ---- Hair against hair (physics.md section 5)
+
+struct HairGrid {
+  int resolution;   // cells on the longest axis of the strands' box at the first frame
+  double pic;       // share of the grid's own velocity that hair takes [-]
+  double residual;  // of the pressure, relative to the right hand side [-]
+  int max_iterations;
+  Cadence cadence;
+  std::optional<double> shelter;  // the wind's loss in hair: factor of Beer and Lambert's exponent [-]
+};
+
+struct HairContacts {
+  double friction;  // Coulomb mu [-]
+  int passes;       // over all contacts
+  Cadence cadence;
+  std::optional<double> radius;  // [m] of every hair; otherwise half the strands' widths
+};
+
+struct HairHair {  // one of them at least
+  std::optional<HairGrid> grid;
+  std::optional<HairContacts> contacts;
+};
+
 // ---- Grooming: what is done to the strands of a groom file, or to those of a run at a frame. Places are in
 // the world, at that time.
 
@@ -290,7 +313,8 @@ struct Effects {
   std::optional<Vec3> gravity;  // [m/s^2]
   std::optional<Inextensible> inextensible;
   std::optional<NonHookean> non_hookean;
-  std::optional<Wind> wind;                 // one that blows at some time
+  std::optional<Wind> wind;  // one that blows at some time
+  std::optional<HairHair> hair_hair;
   std::vector<GroomingOperation> grooming;  // by frame, those of a frame in the scene's order
   std::vector<Solid> solids;
   Collision collision;

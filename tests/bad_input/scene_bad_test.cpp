@@ -31,7 +31,7 @@ constexpr Case kSchemaCases[] = {
     {R"({"limits": {"temperature": 5}})",
      "scene#/limits/temperature: found an unknown key, expected one of edge_strain, speed"},
     {R"({"effects": {"smoke": {}}})",
-     "scene#/effects/smoke: found an unknown key, expected one of collision, gravity, grooming, "
+     "scene#/effects/smoke: found an unknown key, expected one of collision, gravity, grooming, hair_hair, "
      "inextensible, "
      "non_hookean, solids, wind"},
     {R"({"units": {"a/b~c": 1}})", "scene#/units/a~1b~0c: found an unknown key, expected one of length, up"},
@@ -181,6 +181,13 @@ constexpr Case kMeaningCases[] = {
      "scene#/effects/wind/keys/1/frame: found 1.0, expected a frame after the previous key's 2.0"},
     {R"({"effects": {"wind": {"velocity": [0, 1, 0], "shelter": {}}}})",
      "scene#/effects/wind/shelter: found shelter without a head, expected a head in the scene"},
+    // hair against hair
+    {R"({"effects": {"hair_hair": {}}})",
+     "scene#/effects/hair_hair: found neither grid nor contacts, expected one of them, or both ({} takes the "
+     "defaults of either)"},
+    {R"({"effects": {"hair_hair": {"grid": {"shelter": {}}}}})",
+     "scene#/effects/hair_hair/grid/shelter: found shelter without a wind, expected effects.wind in the "
+     "scene"},
     // grooming and interpolation
     {R"({"effects": {"grooming": [{"frame": 3, "trim": {}}]}})",
      "scene#/effects/grooming/0/frame: found 3, expected a frame from first to last, 1 to 2\n"

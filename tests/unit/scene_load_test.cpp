@@ -169,6 +169,33 @@ TEST_F(SceneLoad, ReadsTheNonHookeanCurve) {
   EXPECT_EQ(n.curve, (Curve{{0.25, 0.25}, {0.5, 0.375}}));
 }
 
+TEST_F(SceneLoad, ReadsHairAgainstHair) {
+  const HairHair h = load_json(full()).effects.hair_hair.value();
+  EXPECT_EQ(h.grid->resolution, 64);
+  EXPECT_EQ(h.grid->pic, 0.1);
+  EXPECT_EQ(h.grid->residual, 1e-3);
+  EXPECT_EQ(h.grid->max_iterations, 50);
+  EXPECT_EQ(h.grid->cadence, Cadence::kSubstep);
+  EXPECT_EQ(h.grid->shelter, 0.5);
+  EXPECT_EQ(h.contacts->friction, 0.2);
+  EXPECT_EQ(h.contacts->passes, 2);
+  EXPECT_EQ(h.contacts->cadence, Cadence::kSubstep);
+  EXPECT_DOUBLE_EQ(*h.contacts->radius, 5e-4) << "centimetres";
+  const auto effects = [&](const std::string& hair_hair, const std::string& more = "{}") {
+    return load_json(minimal(), {"/effects=" + more, "/effects/hair_hair=" + hair_hair}).effects;
+  };
+  EXPECT_FALSE(load_json(minimal()).effects.hair_hair);
+  EXPECT_FALSE(effects(R"({"grid": {}})").hair_hair->contacts);
+  EXPECT_FALSE(effects(R"({"grid": {}})").hair_hair->grid->shelter);
+  EXPECT_FALSE(effects(R"({"contacts": {}})").hair_hair->grid);
+  EXPECT_FALSE(effects(R"({"contacts": {}})").hair_hair->contacts->radius) << "the strands' own";
+  EXPECT_FALSE(effects(R"({"grid": {"shelter": {}}})", R"({"wind": {"velocity": [0, 0, 0]}})")
+                   .hair_hair->grid->shelter)
+      << "from a wind that never blows";
+  EXPECT_TRUE(load_json(minimal(), {"/effects/hair_hair={\"grid\": {}}", "/model/type=\"mass_spring\""})
+                  .effects.hair_hair);
+}
+
 TEST_F(SceneLoad, ReadsInterpolation) {
   const Scene s = load_json(full());
   EXPECT_EQ(s.grooms[0].interpolate->group, "b");

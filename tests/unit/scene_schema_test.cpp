@@ -47,13 +47,16 @@ TEST_F(SceneSchema, FillsInExactlyTheSchemasDefaults) {
     "effects": {"grooming": [{"frame": 1, "groom": "b", "trim": {"box": [[0, 0, 0], [1, 1, 1]]}},
                              {"frame": 1, "groom": "b", "lengthen": {"by": 1}},
                              {"frame": 1, "groom": "b", "comb": {"curve": [[0, 0, 0], [1, 1, 1]], "radius": 1}}],
-                "inextensible": {}, "non_hookean": {}, "solids": [{"source": "head"}],
+                "inextensible": {}, "non_hookean": {},
+                "hair_hair": {"grid": {"shelter": {}}, "contacts": {}}, "solids": [{"source": "head"}],
                 "wind": {"velocity": [1, 0, 0], "gusts": {}, "turbulence": {}, "shelter": {}}}})"));
   const Key &key = s.head->animation.keys[0], &carrier = s.head->animation.carrier[0];
   const Groom& groom = s.grooms[0];
   const Grow& grow = *s.grooms[1].grow;
   const Solid& solid = s.effects.solids[0];
   const Wind& wind = *s.effects.wind;
+  const HairGrid& grid = *s.effects.hair_hair->grid;
+  const HairContacts& contacts = *s.effects.hair_hair->contacts;
   const auto is = [](auto value, auto expected) { return value == expected; };
   const auto word = [](bool right, const char* name) { return right ? Json(name) : Json("another word"); };
   const std::string props = "/properties/", defs = "/definitions/", air = "/definitions/wind/properties/";
@@ -180,6 +183,19 @@ TEST_F(SceneSchema, FillsInExactlyTheSchemasDefaults) {
        s.effects.inextensible->max_iterations},
       {defs + "inextensible/properties/per", "/effects/inextensible/per",
        word(is(s.effects.inextensible->cadence, Cadence::kSubstep), "substep")},
+      {defs + "hair_grid/properties/resolution", "/effects/hair_hair/grid/resolution", grid.resolution},
+      {defs + "hair_grid/properties/pic", "/effects/hair_hair/grid/pic", grid.pic},
+      {defs + "hair_grid/properties/residual", "/effects/hair_hair/grid/residual", grid.residual},
+      {defs + "hair_grid/properties/max_iterations", "/effects/hair_hair/grid/max_iterations",
+       grid.max_iterations},
+      {defs + "hair_grid/properties/cadence", "/effects/hair_hair/grid/cadence",
+       word(is(grid.cadence, Cadence::kFrame), "frame")},
+      {defs + "hair_grid/properties/shelter/properties/strength", "/effects/hair_hair/grid/shelter/strength",
+       *grid.shelter},
+      {defs + "hair_contacts/properties/friction", "/effects/hair_hair/contacts/friction", contacts.friction},
+      {defs + "hair_contacts/properties/passes", "/effects/hair_hair/contacts/passes", contacts.passes},
+      {defs + "hair_contacts/properties/cadence", "/effects/hair_hair/contacts/cadence",
+       word(is(contacts.cadence, Cadence::kFrame), "frame")},
       {defs + "solid/properties/friction", "/effects/solids/0/friction", solid.friction},
       {defs + "solid/properties/offset", "/effects/solids/0/offset", solid.offset},
       {defs + "solid/properties/resolution", "/effects/solids/0/resolution", solid.resolution},
@@ -319,6 +335,7 @@ TEST_F(SceneSchema, KnowsEveryWordOfTheSchema) {
       {"/definitions/model/properties/integrity_tangent/enum", "/model/integrity_tangent"},
       {"/definitions/inextensible/properties/per/enum", "/effects/inextensible/per"},
       {"/definitions/non_hookean/properties/memory/enum", "/effects/non_hookean/memory"},
+      {"/definitions/cadence/enum", "/effects/hair_hair/grid/cadence"},
       {"/definitions/trim/properties/keep/enum", "/effects/grooming/1/trim/keep"},
       {"/definitions/lengthen/properties/mode/enum", "/effects/grooming/7/lengthen/mode"},
       {"/properties/cache/properties/strands/enum", "/cache/strands"},

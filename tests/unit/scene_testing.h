@@ -115,6 +115,11 @@ class SceneTest : public testing::Test {
           "normal_drag": {"linear": 1e-4, "quadratic": 2e-5}, "tangential_drag": {"linear": 3e-4, "quadratic": 4e-5},
           "linear_density": 1e-5, "shelter": {"strength": 0.5, "wake": 30}
         },
+        "hair_hair": {
+          "grid": {"resolution": 64, "pic": 0.1, "residual": 1e-3, "max_iterations": 50, "cadence": "substep",
+                   "shelter": {"strength": 0.5}},
+          "contacts": {"friction": 0.2, "passes": 2, "cadence": "substep", "radius": 0.05}
+        },
         "grooming": [
           {"frame": 9, "groom": "cut", "trim": {"plane": {"point": [1, 2, 3], "normal": [0, 0, 2]}}},
           {"frame": 9, "groom": "cut", "trim": {"box": [[0, 1, 2], [3, 4, 5]], "keep": "inside"}},

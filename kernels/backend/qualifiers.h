@@ -6,7 +6,7 @@
 //
 // RINGLET_KERNEL marks what must be inlined (packs live in registers), RINGLET_FUNCTION what the compiler may
 // call, RINGLET_OUTLINED what a GPU had better call: inlined at each of its many uses it would cost more
-// registers than a thread has.
+// registers than a thread has. RINGLET_LAMBDA stands after the captures of one that a backend calls for each index.
 #pragma once
 
 #ifndef RINGLET_ISA
@@ -17,10 +17,12 @@
 #define RINGLET_KERNEL __host__ __device__ __forceinline__
 #define RINGLET_FUNCTION __host__ __device__ inline
 #define RINGLET_OUTLINED __host__ __device__ __noinline__
+#define RINGLET_LAMBDA __host__ __device__
 #else
 #define RINGLET_KERNEL inline __attribute__((always_inline))
 #define RINGLET_FUNCTION inline
 #define RINGLET_OUTLINED inline
+#define RINGLET_LAMBDA
 #endif
 
 #if defined(__CUDA_ARCH__)

@@ -135,9 +135,18 @@ class Strands final : public CudaStrands {
     stream_.parallel_for("contact step", threads(), ContactStepThread{step, scratch()});
   }
 
-  void download_figures(std::span<float> strands, std::span<float> contacts) override {
+  void length_step(const LengthStep<float>& host) override {
+    if (length_figures_.size() == 0) length_figures_.resize(std::size_t(threads()) * kLengthFigures);
+    LengthStep<float> step = host;
+    step.batches = batches(), step.state = state(), step.figures = length_figures_.data();
+    stream_.parallel_for("length step", threads(), LengthStepThread{step, scratch()});
+  }
+
+  void download_figures(std::span<float> strands, std::span<float> contacts,
+                        std::span<float> lengths) override {
     if (!strands.empty()) fetch("strand figures", strand_figures_, strands);
     if (!contacts.empty()) fetch("contact figures", contact_figures_, contacts);
+    if (!lengths.empty()) fetch("length figures", length_figures_, lengths);
     stream_.synchronize();
   }
   void synchronize() override { stream_.synchronize(); }
@@ -148,7 +157,7 @@ class Strands final : public CudaStrands {
            companion_velocity_.bytes() + elongation_.bytes() + air_.bytes() + exposure_.bytes() +
            front_.bytes() + rear_.bytes() + position_.bytes() + velocity_.bytes() + root_motion_.bytes() +
            root_points_.bytes() + skin_.bytes() + strand_figures_.bytes() + contact_figures_.bytes() +
-           scratch_begin_.bytes() + scratch_.bytes() + solids_.bytes();
+           length_figures_.bytes() + scratch_begin_.bytes() + scratch_.bytes() + solids_.bytes();
   }
 
  private:
@@ -194,7 +203,7 @@ class Strands final : public CudaStrands {
   DeviceBuffer<float> air_, exposure_, front_, rear_;
   DeviceBuffer<std::int32_t> skin_;
   DeviceBuffer<double> root_points_;
-  DeviceBuffer<float> strand_figures_, contact_figures_;
+  DeviceBuffer<float> strand_figures_, contact_figures_, length_figures_;
   DeviceBuffer<std::int32_t> scratch_begin_;
   DeviceBuffer<float> scratch_;
   CudaSolids solids_;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "kernels/solid/solid_view.h"
+#include "kernels/strand/length_step.h"
 #include "kernels/strand/strand_batch.h"
 #include "kernels/wind/shelter.h"
 #include "kernels/wind/wind_step.h"
@@ -96,9 +97,12 @@ class CudaStrands {
   virtual void upload_solids(std::span<const SolidView> solids, std::int64_t interval) = 0;
   virtual void contact_step(const ContactParameters& parameters) = 0;
 
-  // Of the last step of each kind: [batches][kFigures] and [batches][kContactFigures]; an empty span is left
-  // out.
-  virtual void download_figures(std::span<float> strands, std::span<float> contacts) = 0;
+  virtual void length_step(const LengthStep<float>& step) = 0;  // pointers as strand_step's
+
+  // Of the last step of each kind: [batches][kFigures], [batches][kContactFigures] and
+  // [batches][kLengthFigures]; an empty span is left out.
+  virtual void download_figures(std::span<float> strands, std::span<float> contacts,
+                                std::span<float> lengths = {}) = 0;
 
   virtual void synchronize() = 0;
   virtual std::vector<CudaLaunches> launches() = 0;  // so far, in order of first use; empty without timing

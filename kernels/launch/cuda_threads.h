@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "kernels/solid/response.h"
+#include "kernels/strand/length_step.h"
 #include "kernels/strand/strand_models.h"
 #include "kernels/wind/shelter.h"
 #include "kernels/wind/wind_step.h"
@@ -21,7 +22,7 @@ static_assert(kWarp % kLanes == 0);
 
 // Scratch values a particle, enough for every step of a model.
 inline int scratch_reals_of(const StrandBatches<float>& model) {
-  return std::max(model.rest_companion ? kMassSpringReals : kStepReals, kContactReals);
+  return std::max({model.rest_companion ? kMassSpringReals : kStepReals, kContactReals, kLengthReals});
 }
 
 struct StrandThread {
@@ -75,6 +76,16 @@ struct ContactStepThread {
   RINGLET_FUNCTION void operator()(int thread) const {
     const StrandThread at = strand_of_thread(thread);
     collide_strands<float>(step, at.batch, at.lane, scratch.of(thread), kWarp);
+  }
+};
+
+struct LengthStepThread {
+  LengthStep<float> step;
+  WarpScratch scratch;
+
+  RINGLET_FUNCTION void operator()(int thread) const {
+    const StrandThread at = strand_of_thread(thread);
+    hold_lengths<float>(step, at.batch, at.lane, scratch.of(thread), kWarp);
   }
 };
 

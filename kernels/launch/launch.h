@@ -2,6 +2,7 @@
 // source.
 #pragma once
 #include "kernels/solid/response.h"
+#include "kernels/strand/length_step.h"
 #include "kernels/strand/strand_batch.h"
 #include "kernels/wind/shelter.h"
 #include "kernels/wind/wind_step.h"
@@ -17,6 +18,7 @@ struct KernelTable {
   void (*contact_step)(const ContactStep<T>& step, int begin, int end, T* scratch);
   void (*wind_step)(const WindStep<T>& step, int begin, int end, T* scratch);
   void (*shelter_step)(const ShelterStep<T>& step, int begin, int end, T* scratch);
+  void (*length_step)(const LengthStep<T>& step, int begin, int end, T* scratch);
 };
 
 enum class InstructionSet { kGeneric, kAvx2, kAvx512 };

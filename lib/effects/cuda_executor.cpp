@@ -81,6 +81,12 @@ class CudaExecutor : public Executor<float> {
   void shelter_step(const kernels::ShelterStep<float>& step) override {
     on_device([&] { strands_->shelter_step(step); });
   }
+  void length_step(const kernels::LengthStep<float>& step) override {
+    on_device([&] {
+      strands_->length_step(step);
+      strands_->download_figures({}, {}, {step.figures, lanes_ * kernels::kLengthFigures});
+    });
+  }
 
  private:
   kernels::CudaDevice device_;

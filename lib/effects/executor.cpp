@@ -40,6 +40,7 @@ class CpuExecutor : public Executor<T> {
   void contact_step(const kernels::ContactStep<T>& step, int) override { run(kernels_.contact_step, step); }
   void wind_step(const kernels::WindStep<T>& step) override { run(kernels_.wind_step, step); }
   void shelter_step(const kernels::ShelterStep<T>& step) override { run(kernels_.shelter_step, step); }
+  void length_step(const kernels::LengthStep<T>& step) override { run(kernels_.length_step, step); }
 
  private:
   template <class Step>

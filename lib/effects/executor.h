@@ -13,13 +13,16 @@ template <class T>
 struct WindStep;
 template <class T>
 struct ShelterStep;
+template <class T>
+struct LengthStep;
 }  // namespace ringlet::kernels
 
 namespace ringlet::effects {
 
 // Runs kernels over all batches. The state of the model that it was made for lives with the executor while it
-// steps: `fetch` brings it back to the host, `submit` takes the host's; where the roots go is told by
-// `submit_roots`, which holds until the next. The pointers in a step are the host's. Throws Error{kDevice}.
+// steps: `fetch` brings it back to the host, `submit` takes the host's (on the CPU they are the same and
+// neither costs anything); where the roots go is told by `submit_roots`, which holds until the next. The
+// pointers in a step are the host's. Throws Error{kDevice}.
 template <class T>
 class Executor {
  public:
@@ -34,6 +37,7 @@ class Executor {
   virtual void contact_step(const kernels::ContactStep<T>& step, int frame) = 0;
   virtual void wind_step(const kernels::WindStep<T>& step) = 0;
   virtual void shelter_step(const kernels::ShelterStep<T>& step) = 0;
+  virtual void length_step(const kernels::LengthStep<T>& step) = 0;
 };
 
 // `instruction_set`: avx512, avx2 or generic; empty: the widest this processor has. Throws Error{kUsage} for

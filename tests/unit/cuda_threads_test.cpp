@@ -176,5 +176,29 @@ TEST(CudaThreads, CollideAsTheLanesDo) {
   EXPECT_EQ(lanes.contact_figures, threads.contact_figures);
 }
 
+TEST(CudaThreads, HoldLengthsAsTheLanesDo) {
+  const StrandParameters<float> parameters = default_parameters();
+  HostGroom lanes(mixed_strands(70, 3)), threads(mixed_strands(70, 3));
+  lanes.move_roots(parameters.step), threads.move_roots(parameters.step);
+  const auto length_step = [](HostGroom& groom, std::vector<float>& figures) {
+    for (std::size_t k = 0; k < groom.state.position.size(); k += 7) groom.state.position[k] *= 1.01f;
+    figures.assign(static_cast<std::size_t>(groom.model.layout.batches()) * kLengthFigures * kLanes, 0.0f);
+    return LengthStep<float>{
+        groom.model.view(), groom.state.view(), 1.0f / 60, 1, 8, 1e-4f, figures.data(), 1e3f, 1e3f};
+  };
+  std::vector<float> of_lanes, of_threads;
+  const LengthStep<float> step = length_step(threads, of_threads);
+  run_threads(threads, [&](WarpScratch scratch) { return LengthStepThread{step, scratch}; });
+  const int longest = lanes.model.layout.longest();
+  state::AlignedVector<float> scratch(static_cast<std::size_t>(scratch_reals(longest)));
+  cpu_kernels<float>(best_instruction_set())
+      .length_step(length_step(lanes, of_lanes), 0, lanes.model.layout.batches(), scratch.data());
+  EXPECT_GT(*std::max_element(of_threads.begin(), of_threads.end()), 1) << "iterations";
+  if (best_instruction_set() == InstructionSet::kGeneric) GTEST_SKIP() << "no fused multiply-add here";
+  EXPECT_EQ(lanes.state.position, threads.state.position);
+  EXPECT_EQ(lanes.state.velocity, threads.state.velocity);
+  EXPECT_EQ(of_lanes, of_threads);
+}
+
 }  // namespace
 }  // namespace ringlet::cuda_testing

@@ -1,5 +1,6 @@
 #include "kernels_support.h"
 
+#include "kernels/strand/length_step.h"
 #include "kernels/strand/strand_models.h"
 
 namespace ringlet::kernels_testing {
@@ -27,6 +28,11 @@ const kernels::KernelTable<T>& scalar_kernels() {
       [](const kernels::ShelterStep<T>& step, int begin, int end, T*) {
         for (int batch = begin; batch < end; ++batch)
           for (int lane = 0; lane < kernels::kLanes; ++lane) kernels::shelter_strand(step, batch, lane);
+      },
+      [](const kernels::LengthStep<T>& step, int begin, int end, T* scratch) {
+        for (int batch = begin; batch < end; ++batch)
+          for (int lane = 0; lane < kernels::kLanes; ++lane)
+            kernels::hold_lengths<T>(step, batch, lane, scratch, 1);
       }};
   return table;
 }

@@ -31,6 +31,22 @@ Diverged::Diverged(state::Frame frame_, std::string stage_, std::int64_t strand_
 
 namespace {
 
+// The radius of the hair at each particle [m], where contacts or the shelter of hair ask for it. Throws
+// Error{kInput} where all hair is without width.
+std::vector<float> radii(const scene::Scene& scene, const groom::Strands& strands) {
+  const auto& hair_hair = scene.effects.hair_hair;
+  if (!hair_hair || !(hair_hair->contacts || hair_hair->grid->shelter)) return {};
+  if (hair_hair->contacts && hair_hair->contacts->radius)
+    return std::vector<float>(strands.points.size(), static_cast<float>(*hair_hair->contacts->radius));
+  std::vector<float> radii;
+  for (const float width : strands.widths) radii.push_back(0.5f * width);
+  if (*std::max_element(radii.begin(), radii.end()) > 0) return radii;
+  throw Error(ErrorKind::kInput, "/effects/hair_hair",
+              "the grooms' files give all hair the width 0, expected hair of some width",
+              hair_hair->contacts ? "give contacts a radius, or the files widths"
+                                  : "give the files widths, or leave out the shelter");
+}
+
 template <class T>
 state::StrandInput strand_input(const scene::Scene& scene, const World& world) {
   state::StrandInput input;
@@ -39,6 +55,7 @@ state::StrandInput strand_input(const scene::Scene& scene, const World& world) {
   input.living = world.living;
   input.rest = strands.points;
   input.stiffness = world.stiffness;
+  input.radius = radii(scene, strands);
   input.elongation = scene.effects.non_hookean.has_value();
   input.companions = scene.model.type == scene::ModelType::kMassSpring;
   if (scene.model.preload && scene.effects.gravity) {

@@ -32,7 +32,8 @@ StrandModel<T>::StrandModel(const StrandInput& input)
       stiffness(input.stiffness.empty() ? 0 : layout.rows() * kCouplings * kLanes, T(0)),
       preload(layout.batches() * 3 * kLanes, T(0)),
       rest_companion(input.companions ? rest.size() : 0, T(0)),
-      per_length(input.elongation ? layout.batches() * kLanes : 0, T(0)) {
+      per_length(input.elongation ? layout.batches() * kLanes : 0, T(0)),
+      radius(input.radius.empty() ? 0 : layout.rows() * kLanes, T(0)) {
   std::size_t first = 0;
   for (std::size_t strand = 0; strand < input.counts.size(); ++strand) {
     const int n = input.living.empty() ? input.counts[strand] : input.living[strand];
@@ -44,6 +45,8 @@ StrandModel<T>::StrandModel(const StrandInput& input)
       for (int k = 0; k < kCouplings; ++k)
         stiffness[layout.at(strand, i, kCouplings, k)] =
             static_cast<T>(input.stiffness[(first + i) * kCouplings + k]);
+    for (int i = 0; i < input.counts[strand] && !radius.empty(); ++i)
+      radius[layout.at(strand, i, 1, 0)] = static_cast<T>(input.radius[first + i]);
     if (input.companions) {
       const std::vector<Vec3> companions = rest_companions(points);
       for (int i = 0; i + 1 < n; ++i)
@@ -101,7 +104,7 @@ kernels::StrandBatches<T> StrandModel<T>::view() const {
 template <class T>
 std::size_t StrandModel<T>::bytes() const {
   return (count.size() + rest.size() + rest_length.size() + stiffness.size() + preload.size() +
-          rest_companion.size() + per_length.size()) *
+          rest_companion.size() + per_length.size() + radius.size()) *
          sizeof(T);
 }
 

@@ -24,6 +24,7 @@ struct StrandInput {
   std::vector<float> stiffness;  // [particles * kCouplings] [1/s^2], empty: uniform
   std::vector<Mat3> first_rotation;  // [strands] root rotation at the first frame; for the preload
   std::optional<Vec3> preload;       // gravity to preload against [m/s^2]; empty: no preload
+  std::vector<float> radius;         // [particles] of the hair [m]; empty: nothing asks
   bool companions = false;           // the mass-spring model's
   bool elongation = false;           // the strands' lengths are asked for (kernels::Elongation)
 };
@@ -33,6 +34,9 @@ struct StrandModel {
   StrandLayout layout;
   AlignedVector<T> count, rest, rest_length, stiffness, preload;
   AlignedVector<T> rest_companion, per_length;  // [rows][3], [batches]; or empty
+  // [rows] of the hair at each particle [m], or empty. By particle, as the cache's widths and `stiffness`:
+  // where grooming cuts and lengthens, hair that grows again is as thick there as it was.
+  AlignedVector<T> radius;
 
   explicit StrandModel(const StrandInput& input);
   kernels::StrandBatches<T> view() const;

@@ -45,6 +45,8 @@ class Stage {
   virtual std::string name() const = 0;
   virtual std::size_t bytes() const = 0;      // that it owns
   virtual std::int64_t launches() const = 0;  // kernel launches a frame
+  // Before anything of the substep has moved, the roots neither. At a frame's start the host has the state.
+  virtual void begin(Executor<T>&, const Substep&) {}
   virtual void run(Executor<T>& executor, const Substep& substep, FrameReport& report) = 0;
   // The first strand that diverged in the last `run`, -1 for none.
   virtual std::int64_t diverged_strand() const { return -1; }

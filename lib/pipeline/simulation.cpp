@@ -234,6 +234,7 @@ void TypedSimulation<T>::step_frame(int frame, effects::FrameReport& report, Sta
   for (int s = 0; s < substeps; ++s) {
     const effects::Substep substep{frame,  time_of(frame - 1, s), time_of(frame - 1, s + 1), step,
                                    s == 0, s + 1 == substeps};
+    for (const auto& stage : stages_) stage->begin(*executor_, substep);
     Timer timer;
     if (!still) move_roots(substep.time);
     seconds[0].second += timer.seconds();

@@ -1,0 +1,83 @@
+// Cells of a lattice: Morton keys, tiles of 4 x 4 x 4 cells, and where a cell lies in its tile.
+//
+// A key interleaves the bits of x, y and z, x lowest. The lowest six bits of a cell's key number it within
+// its tile, those above are its tile's key: sorted by key, a tile's cells are consecutive, and so are the
+// eight that make one cell of a lattice of double spacing.
+#pragma once
+#include <cstdint>
+
+#include "kernels/backend/qualifiers.h"
+
+namespace ringlet::kernels {
+
+enum Direction { kLowX, kHighX, kLowY, kHighY, kLowZ, kHighZ, kDirections };
+
+inline constexpr int kTileEdge = 4, kTileCells = 64, kAround = 27;  // tiles round a tile, itself among them
+inline constexpr int kTileAxisBits = 18;                            // of a tile's coordinate
+inline constexpr std::uint64_t kAxisBits = 0x1249249249249249ull;   // a key's bits that are x's
+
+inline namespace RINGLET_ISA {
+
+// The bits of a coordinate three apart.
+RINGLET_FUNCTION std::uint64_t spread_bits(std::uint32_t a) {
+  std::uint64_t x = a & 0x1fffffu;
+  x = (x | x << 32) & 0x1f00000000ffffull;
+  x = (x | x << 16) & 0x1f0000ff0000ffull;
+  x = (x | x << 8) & 0x100f00f00f00f00full;
+  x = (x | x << 4) & 0x10c30c30c30c30c3ull;
+  return (x | x << 2) & kAxisBits;
+}
+RINGLET_FUNCTION std::uint32_t gather_bits(std::uint64_t x) {
+  x &= kAxisBits;
+  x = (x | x >> 2) & 0x10c30c30c30c30c3ull;
+  x = (x | x >> 4) & 0x100f00f00f00f00full;
+  x = (x | x >> 8) & 0x1f0000ff0000ffull;
+  x = (x | x >> 16) & 0x1f00000000ffffull;
+  return static_cast<std::uint32_t>((x | x >> 32) & 0x1fffffu);
+}
+RINGLET_FUNCTION std::uint64_t key_of(std::uint32_t x, std::uint32_t y, std::uint32_t z) {
+  return spread_bits(x) | spread_bits(y) << 1 | spread_bits(z) << 2;
+}
+
+// The key one further along an axis (0 to 2), wrapping at the end of its bits.
+RINGLET_FUNCTION std::uint64_t key_after(std::uint64_t key, int axis) {
+  const std::uint64_t mask = kAxisBits << axis, rest = ~mask;
+  return (((key | rest) + (std::uint64_t{1} << axis)) & mask) | (key & ~mask);
+}
+RINGLET_FUNCTION std::uint64_t key_before(std::uint64_t key, int axis) {
+  const std::uint64_t mask = kAxisBits << axis;
+  return (((key & mask) - (std::uint64_t{1} << axis)) & mask) | (key & ~mask);
+}
+
+// The number of a cell within its tile, from its coordinates' lowest two bits.
+RINGLET_KERNEL int cell_in_tile(int x, int y, int z) {
+  const auto spread = [](int a) { return (a & 1) | (a & 2) << 2; };
+  return spread(x) | spread(y) << 1 | spread(z) << 2;
+}
+RINGLET_KERNEL int coordinate_in_tile(int cell, int axis) {
+  return (cell >> axis & 1) | (cell >> (axis + 3) & 1) << 1;
+}
+
+RINGLET_KERNEL int ones(std::uint64_t bits) {
+#if defined(__CUDA_ARCH__)
+  return __popcll(bits);
+#else
+  return __builtin_popcountll(bits);
+#endif
+}
+
+// Where a key stands in a sorted list, -1 where it does not.
+RINGLET_FUNCTION std::int32_t find_key(const std::uint64_t* keys, std::int32_t n, std::uint64_t key) {
+  std::int32_t low = 0, high = n;
+  while (low < high) {
+    const std::int32_t middle = (low + high) / 2;
+    if (keys[middle] < key)
+      low = middle + 1;
+    else
+      high = middle;
+  }
+  return low < n && keys[low] == key ? low : -1;
+}
+
+}  // namespace RINGLET_ISA
+}  // namespace ringlet::kernels

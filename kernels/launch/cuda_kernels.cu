@@ -70,6 +70,8 @@ class Strands final : public CudaStrands {
     send("elongation", host.elongation, elongation_);
     send("companions", host.companion_position, companion_position_);
     send("companions", host.companion_velocity, companion_velocity_);
+    shelter_.resize(host.shelter.size());
+    send("shelter", host.shelter, shelter_);
   }
   void download_state(const StateArrays<float>& host) override {
     fetch("position", position_, host.position), fetch("velocity", velocity_, host.velocity);
@@ -101,6 +103,7 @@ class Strands final : public CudaStrands {
     WindStep<float> step = host;
     step.batches = batches(), step.position = position_.data(), step.root_points = root_points_.data();
     if (host.exposure) step.exposure = exposure_.data();
+    if (host.shelter) step.shelter = shelter_.data();
     step.air = air_.data();
     stream_.parallel_for("wind step", threads(), WindStepThread{step});
   }
@@ -155,9 +158,10 @@ class Strands final : public CudaStrands {
     return row_.bytes() + count_.bytes() + rest_.bytes() + rest_length_.bytes() + stiffness_.bytes() +
            preload_.bytes() + per_length_.bytes() + rest_companion_.bytes() + companion_position_.bytes() +
            companion_velocity_.bytes() + elongation_.bytes() + air_.bytes() + exposure_.bytes() +
-           front_.bytes() + rear_.bytes() + position_.bytes() + velocity_.bytes() + root_motion_.bytes() +
-           root_points_.bytes() + skin_.bytes() + strand_figures_.bytes() + contact_figures_.bytes() +
-           length_figures_.bytes() + scratch_begin_.bytes() + scratch_.bytes() + solids_.bytes();
+           shelter_.bytes() + front_.bytes() + rear_.bytes() + position_.bytes() + velocity_.bytes() +
+           root_motion_.bytes() + root_points_.bytes() + skin_.bytes() + strand_figures_.bytes() +
+           contact_figures_.bytes() + length_figures_.bytes() + scratch_begin_.bytes() + scratch_.bytes() +
+           solids_.bytes();
   }
 
  private:
@@ -200,7 +204,7 @@ class Strands final : public CudaStrands {
   DeviceBuffer<float> count_, rest_, rest_length_, stiffness_, preload_, rest_companion_, per_length_;
   DeviceBuffer<float> position_, velocity_, companion_position_, companion_velocity_, elongation_,
       root_motion_;
-  DeviceBuffer<float> air_, exposure_, front_, rear_;
+  DeviceBuffer<float> air_, exposure_, shelter_, front_, rear_;
   DeviceBuffer<std::int32_t> skin_;
   DeviceBuffer<double> root_points_;
   DeviceBuffer<float> strand_figures_, contact_figures_, length_figures_;

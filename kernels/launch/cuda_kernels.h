@@ -65,6 +65,7 @@ struct StateArrays {
   std::span<T> position, velocity;
   std::span<T> elongation = {};                                   // [rows] Elongation::memory
   std::span<T> companion_position = {}, companion_velocity = {};  // [rows][3] as StrandState
+  std::span<T> shelter = {};  // [rows] as WindStep; the device only reads it, so that it does not come back
 };
 
 // The strands of a run on the device. Arrays are laid out as on the host (StrandBatches, StrandState,

@@ -33,6 +33,7 @@ struct WindStep {
   WindField<T> field;
   const T* exposure;  // [rows] share of the wind that reaches the segment that begins there; null: all
   T* air;             // [rows][3] out: velocity of the air in the middle of that segment [m/s]
+  const T* shelter = nullptr;  // [rows] share that hair before it lets through, as exposure; null: all
 };
 
 inline namespace RINGLET_ISA {
@@ -91,6 +92,7 @@ RINGLET_KERNEL void blow(const WindStep<Scalar<R>>& step, int batch, int lane) {
     const Vector3<R> next = load3<R>(step.position + base + 3 * (i + 1) * kLanes, kLanes);
     Vector3<R> u = air_velocity(step.field, origin + R(T(0.5)) * (here + next));
     if (step.exposure) u = load<R>(step.exposure + (row + i) * kLanes + lane) * u;
+    if (step.shelter) u = load<R>(step.shelter + (row + i) * kLanes + lane) * u;
     store3<R>(step.air + base + 3 * i * kLanes, kLanes, u);
     here = next;
   }

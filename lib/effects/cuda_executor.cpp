@@ -43,7 +43,7 @@ class CudaExecutor : public Executor<float> {
   void submit(const state::StrandState<float>& state) override {
     on_device([&] {
       strands_->upload_state({state.position, state.velocity, state.elongation, state.companion_position,
-                              state.companion_velocity});
+                              state.companion_velocity, state.shelter});
     });
   }
   void submit_roots(const state::StrandState<float>& state) override {

@@ -29,6 +29,16 @@ struct FrameReport {
   double contact_rounds = 0;  // most rounds of length and contact projections
   double pushed = 0;          // largest last push-out at the frame's end [m]
   double swept = 0;           // particles that out-ran the narrow band and were looked for along their way
+  // Hair against hair, where there are such stages: sums over the frame, and the largest of what has a
+  // largest.
+  double grid_solves = 0, grid_iterations = 0;  // of the pressure
+  double grid_residual = 0;                     // that was left, relative to the right hand side [-]
+  double grid_density = 0;                      // largest at the frame's end, over its target [-]
+  double grid_cells = 0;                        // fluid cells of the largest solve
+  double contact_pairs = 0;                     // segments that were looked at, two by two
+  double contacts = 0;                          // those that touched
+  double contact_depth = 0;                     // largest overlap that was left [m]
+  double crossings = 0;                         // pairs that passed through one another and could not be held
 };
 
 // A strand that left the limits or is no longer finite.
@@ -45,6 +55,9 @@ class Stage {
   virtual std::string name() const = 0;
   virtual std::size_t bytes() const = 0;      // that it owns
   virtual std::int64_t launches() const = 0;  // kernel launches a frame
+  // `rest`: the strands at rest, posed by the roots at the run's first time. Before anything is stepped, and
+  // whenever grooming has changed the model. The executor holds this state too.
+  virtual void at_rest(Executor<T>&, const state::StrandState<T>& /*rest*/) {}
   // Before anything of the substep has moved, the roots neither. At a frame's start the host has the state.
   virtual void begin(Executor<T>&, const Substep&) {}
   virtual void run(Executor<T>& executor, const Substep& substep, FrameReport& report) = 0;

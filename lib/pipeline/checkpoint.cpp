@@ -18,6 +18,7 @@ void each_array(Model& model, State& state, bool groomed, const Visit& visit) {
   if_there("position", state.position);
   if_there("velocity", state.velocity);
   if_there("elongation", state.elongation);
+  if_there("shelter", state.shelter);
   if_there("companion_position", state.companion_position);
   if_there("companion_velocity", state.companion_velocity);
   if (!groomed) return;

@@ -111,6 +111,7 @@ class TypedSimulation : public Simulation {
       stages_.push_back(
           effects::make_wind_stage<T>(scene_, world_.head.get(), roots_.centre(), model_, state_));
     stages_.push_back(effects::make_strand_stage<T>(scene_, model_, state_));
+    if (scene_.effects.hair_hair) add_hair_stages(*scene_.effects.hair_hair);
     if (!world_.solids.empty())
       stages_.push_back(effects::make_contact_stage<T>(scene_, world_.solids, world_.skin, model_, state_));
     if (!scene_.effects.grooming.empty())
@@ -124,8 +125,10 @@ class TypedSimulation : public Simulation {
   bool run(const FrameRange& range, state::FrameSink& sink, const RunControl& control) override;
 
  private:
+  void add_hair_stages(const scene::HairHair& hair_hair);
   void make_plan();
   void start();
+  void tell_rest();
   void rehearse_first_frame();
   void resume(const state::Snapshot& snapshot);
   void groom(int frame);
@@ -157,6 +160,15 @@ class TypedSimulation : public Simulation {
 };
 
 template <class T>
+void TypedSimulation<T>::add_hair_stages(const scene::HairHair& hair_hair) {
+  if (hair_hair.grid)
+    throw Error(ErrorKind::kInput, "/effects/hair_hair/grid", "this program has no grid stage yet", "");
+  if (hair_hair.contacts)
+    throw Error(ErrorKind::kInput, "/effects/hair_hair/contacts", "this program has no contacts stage yet",
+                "");
+}
+
+template <class T>
 void TypedSimulation<T>::make_plan() {
   plan_.strands = static_cast<std::int64_t>(roots_.strands());
   plan_.particles = std::accumulate(world_.living.begin(), world_.living.end(), std::int64_t{0});
@@ -175,6 +187,8 @@ void TypedSimulation<T>::make_plan() {
                           (before_.size() + now_.size()) * sizeof(Pose), roots_.still() ? 0 : substeps});
   add("wind", "mean wind, gusts, turbulence, shelter");
   add("strands", "the strand model: forces, implicit step, lengths");
+  add("grid", "hair keeps its volume: density, pressure, friction");
+  add("contacts", "hair against hair: segments touch, Coulomb friction");
   add("solids", "collision with level sets, friction");
   const auto add_host = [&](const char* name, const char* what, bool runs, std::size_t bytes) {
     plan_.stages.push_back({name, what, runs, runs ? bytes : 0, 0});  // no kernels of the device
@@ -211,6 +225,21 @@ void TypedSimulation<T>::start() {
   roots_.pose(first_time(scene_.frames), now_);
   state::pose_at_rest<T>(state_, model_, now_);
   executor_->submit(state_);
+}
+
+// Shows the stages of hair against hair the strands as they are made to be. The executor then holds that
+// state.
+template <class T>
+void TypedSimulation<T>::tell_rest() {
+  if (!scene_.effects.hair_hair) return;
+  std::vector<Pose> first(roots_.strands());
+  roots_.pose(first_time(scene_.frames), first);
+  state::StrandState<T> rest = state_;
+  state::pose_at_rest<T>(rest, model_, first);
+  for (std::size_t s = 0; s < first.size(); ++s) set_root_motion(rest, model_.layout, s, first[s], first[s]);
+  executor_->submit(rest);
+  executor_->submit_roots(rest);
+  for (const auto& stage : stages_) stage->at_rest(*executor_, rest);
 }
 
 // What the first frame's grooming cannot do is bad input, told before a cache is written or replaced.
@@ -284,6 +313,7 @@ void TypedSimulation<T>::resume(const state::Snapshot& snapshot) {
   roots_.pose(time_of(snapshot.frame, 0), now_);
   for (std::size_t s = 0; s < now_.size(); ++s) set_root_motion(state_, model_.layout, s, now_[s], now_[s]);
   if (grooming_) renew_executor();
+  tell_rest();
   executor_->submit(state_);
 }
 
@@ -298,6 +328,7 @@ template <class T>
 void TypedSimulation<T>::groom(int frame) {
   if (!grooming_ || !grooming_->apply(frame, now_)) return;
   renew_executor();
+  tell_rest();
   executor_->submit(state_);
   executor_->submit_roots(state_);
 }
@@ -309,7 +340,7 @@ bool TypedSimulation<T>::run(const FrameRange& range, state::FrameSink& sink, co
   StageSeconds seconds;
   const std::int64_t strand_steps = plan_.strands * plan_.substeps;
   const auto hand_on = [&](state::Frame out, double spent) {
-    const state::Figures solver = figures_of(report, strand_steps);
+    const state::Figures solver = figures_of(report, strand_steps, scene_.effects.hair_hair);
     out.figures.insert(out.figures.begin(), solver.begin(), solver.end());
     sink.write(std::move(out), save(frame, model_, state_, grooming_.has_value()), spent);
   };
@@ -325,6 +356,7 @@ bool TypedSimulation<T>::run(const FrameRange& range, state::FrameSink& sink, co
     frame = control.resume->frame;
     resume(*control.resume);
   } else {
+    tell_rest();
     groom(frame);
     if (frame >= range.first) hand_on(frame_now(frame), 0);
   }

@@ -57,9 +57,12 @@ struct StrandState {
   AlignedVector<T> root_motion;         // [batches][kRootValues]
   AlignedVector<double> root_points;    // [batches][3] at the substep's end [m]
   // Empty, unless an effect that has them is there; it makes them.
-  AlignedVector<T> elongation;                              // [rows] kernels::Elongation::memory
-  AlignedVector<T> air;                                     // [rows][3] kernels::Air::velocity [m/s]
+  AlignedVector<T> elongation;  // [rows] kernels::Elongation::memory
+  AlignedVector<T> air;         // [rows][3] kernels::Air::velocity [m/s]
+  AlignedVector<T> shelter;  // [rows] share of the wind that hair before it lets through to the segment that
+                             // begins there, when last looked at; 1 before that
   AlignedVector<T> companion_position, companion_velocity;  // [rows][3] kernels::StrandState
+  Vec3 wind = Vec3::Zero();  // the mean wind now [m/s]; zero without such an effect
 
   explicit StrandState(const StrandModel<T>& model);
   kernels::StrandState<T> view();

@@ -109,10 +109,14 @@ void Grooming<T>::write(std::size_t strand, const groom::EditedStrand& edited,
     if (k >= before.velocity.size() || edited.velocity[k] != before.velocity[k])
       put(state_.velocity, i, edited.velocity[k]);
   }
-  // What hair has suffered it keeps, whatever its new shape; particles that are new have suffered nothing.
-  for (int i = 0; i < room && !state_.elongation.empty(); ++i)
-    if (static_cast<std::size_t>(i) >= std::min(n, before.position.size()))
-      state_.elongation[model_.layout.at(strand, i, 1, 0)] = T(0);
+  // What hair has suffered it keeps, whatever its new shape; particles that are new have suffered nothing and
+  // stand free.
+  for (int i = 0; i < room; ++i) {
+    if (static_cast<std::size_t>(i) < std::min(n, before.position.size())) continue;
+    const std::size_t at = model_.layout.at(strand, i, 1, 0);
+    if (!state_.elongation.empty()) state_.elongation[at] = T(0);
+    if (!state_.shelter.empty()) state_.shelter[at] = T(1);
+  }
   if (std::holds_alternative<scene::Rest>(operation.what) && scene_.model.preload && scene_.effects.gravity)
     model_.set_preload(strand, *scene_.effects.gravity, edited.rotation);
 }

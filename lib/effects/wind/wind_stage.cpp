@@ -34,9 +34,10 @@ class WindStage : public Stage<T> {
   void run(Executor<T>& executor, const Substep& substep, FrameReport&) override {
     if (substep.first_of_frame) sheltered_ = false;
     if (shelter_ && !sheltered_) find_shelter(executor, substep.time);
+    state_.wind = field_.mean(substep.time);
     executor.wind_step({model_.view(), state_.position.data(), state_.root_points.data(),
                         field_.at<T>(substep.time), sheltered_ ? exposure_.data() : nullptr,
-                        state_.air.data()});
+                        state_.air.data(), state_.shelter.empty() ? nullptr : state_.shelter.data()});
   }
 
  private:

@@ -8,8 +8,8 @@
 
 namespace ringlet::effects {
 
-// For a scene with wind. Makes `state.air`. `head`, null without one, gives shelter where the scene asks for
-// it; `origin` is a point near the hair [m]. All references must outlive the stage.
+// For a scene with wind. Makes `state.air`, and writes `state.wind`. `head`, null without one, gives shelter
+// where the scene asks for it; `origin` is a point near the hair [m]. All references must outlive the stage.
 template <class T>
 std::unique_ptr<Stage<T>> make_wind_stage(const scene::Scene& scene, const solids::AnimatedMesh* head,
                                           const Vec3& origin, const state::StrandModel<T>& model,

@@ -138,6 +138,10 @@ TEST(CudaThreads, BlowAndShelterAsTheKernelsOfTheProcessorDo) {
       {{1, 2, 3}, 2, {{1, 2, 0}, {0, 1, 3}}, {{2, -1, 0}, {1, 0, 0}}, {0.1f, 0.7f}, {0, 0, 0}},
       exposure.data(),
       air.data()};
+  state::AlignedVector<float> through_hair(exposure.size());
+  for (std::size_t k = 0; k < through_hair.size(); ++k)
+    through_hair[k] = 1 / (1 + 0.01f * static_cast<float>(k));
+  wind.shelter = through_hair.data();
   run_threads(groom, [&](WarpScratch) { return ShelterStepThread{shelter}; });
   run_threads(groom, [&](WarpScratch) { return WindStepThread{wind}; });
   shelter.exposure = other_exposure.data(), wind.exposure = other_exposure.data(),
@@ -180,13 +184,13 @@ TEST(CudaThreads, HoldLengthsAsTheLanesDo) {
   const StrandParameters<float> parameters = default_parameters();
   HostGroom lanes(mixed_strands(70, 3)), threads(mixed_strands(70, 3));
   lanes.move_roots(parameters.step), threads.move_roots(parameters.step);
-  const auto length_step = [](HostGroom& groom, std::vector<float>& figures) {
+  const auto length_step = [](HostGroom& groom, state::AlignedVector<float>& figures) {
     for (std::size_t k = 0; k < groom.state.position.size(); k += 7) groom.state.position[k] *= 1.01f;
     figures.assign(static_cast<std::size_t>(groom.model.layout.batches()) * kLengthFigures * kLanes, 0.0f);
     return LengthStep<float>{
         groom.model.view(), groom.state.view(), 1.0f / 60, 1, 8, 1e-4f, figures.data(), 1e3f, 1e3f};
   };
-  std::vector<float> of_lanes, of_threads;
+  state::AlignedVector<float> of_lanes, of_threads;
   const LengthStep<float> step = length_step(threads, of_threads);
   run_threads(threads, [&](WarpScratch scratch) { return LengthStepThread{step, scratch}; });
   const int longest = lanes.model.layout.longest();

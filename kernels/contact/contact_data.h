@@ -1,0 +1,87 @@
+// The plain arrays that the contacts of hair against hair work on.
+#pragma once
+#include "kernels/backend/lane_bits.h"
+#include "kernels/contact/contact_step.h"
+#include "kernels/contact/segment_pair.h"
+
+namespace ringlet::kernels {
+inline namespace RINGLET_ISA {
+
+// Particles are numbered row * kLanes + lane, as a component of the state is: the next along the strand is
+// kLanes further. A segment has the number of the particle that it begins at.
+template <class T>
+struct Place {
+  T x, y, z;  // against an origin that all share, at the same time [m]
+  T extra;    // start: the particle's freedom, 1 or 0 where it is prescribed; end: its radius [m]
+};
+
+template <class T>
+struct HairPlaces {
+  const Place<T>*start, *end;
+};
+
+struct SegmentNumbers {
+  std::int32_t a, b;
+};
+
+template <class R>
+RINGLET_KERNEL Vector3<R> load_lanes(const Scalar<R> (&lanes)[3][Traits<R>::kWidth]) {
+  return {load<R>(lanes[0]), load<R>(lanes[1]), load<R>(lanes[2])};
+}
+
+// The places of a particle for each lane.
+template <class R>
+RINGLET_KERNEL Vector3<R> gather(const Place<Scalar<R>>* places, const std::int32_t* particles,
+                                 std::int32_t offset) {
+  alignas(64) Scalar<R> lanes[3][Traits<R>::kWidth];
+  for (int lane = 0; lane < Traits<R>::kWidth; ++lane) {
+    const Place<Scalar<R>>& place = places[particles[lane] + offset];
+    lanes[0][lane] = place.x, lanes[1][lane] = place.y, lanes[2][lane] = place.z;
+  }
+  return load_lanes<R>(lanes);
+}
+template <class R>
+RINGLET_KERNEL R gather_extra(const Place<Scalar<R>>* places, const std::int32_t* particles,
+                              std::int32_t offset) {
+  alignas(64) Scalar<R> lanes[Traits<R>::kWidth];
+  for (int lane = 0; lane < Traits<R>::kWidth; ++lane) lanes[lane] = places[particles[lane] + offset].extra;
+  return load<R>(lanes);
+}
+
+template <class R>
+RINGLET_KERNEL Segment<R> gather_segment(const Place<Scalar<R>>* places, const std::int32_t* segments) {
+  return {gather<R>(places, segments, 0), gather<R>(places, segments, kLanes)};
+}
+
+// The pairs of as many lanes.
+template <class R>
+RINGLET_KERNEL SegmentPair<R> gather_pair(const HairPlaces<Scalar<R>>& places, const std::int32_t* a,
+                                          const std::int32_t* b) {
+  return {gather_segment<R>(places.start, a), gather_segment<R>(places.start, b),
+          gather_segment<R>(places.end, a), gather_segment<R>(places.end, b)};
+}
+
+// Which of two segments is `a` must not depend on the strands' order in the groom: the one that comes first
+// by where it is.
+template <class T>
+RINGLET_KERNEL bool comes_first(const Place<T>* places, std::int32_t one, std::int32_t other) {
+  for (int offset = 0; offset <= kLanes; offset += kLanes) {
+    const Place<T>&p = places[one + offset], &q = places[other + offset];
+    if (p.x != q.x) return p.x < q.x;
+    if (p.y != q.y) return p.y < q.y;
+    if (p.z != q.z) return p.z < q.z;
+  }
+  return one < other;  // in the very same place
+}
+
+template <class T>
+RINGLET_KERNEL T atomic_add(T* to, T value) {
+#if defined(__CUDA_ARCH__)
+  return atomicAdd(to, value);
+#else
+  return __atomic_fetch_add(to, value, __ATOMIC_RELAXED);
+#endif
+}
+
+}  // namespace RINGLET_ISA
+}  // namespace ringlet::kernels

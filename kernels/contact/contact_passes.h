@@ -1,0 +1,190 @@
+// Passes over the pairs: each finds the contacts as places are now, weighs and applies their impulses.
+//
+// A particle is moved by the sum of its contacts' impulses, which are rounded so that this sum is exact: it
+// does not depend on the order of pairs, on threads, or on the order of strands. What one contact gives to a
+// particle of one segment it takes from the other's.
+#pragma once
+#include "kernels/contact/contact_response.h"
+
+namespace ringlet::kernels {
+inline namespace RINGLET_ISA {
+
+// What is known of a pair in a pass.
+template <class T>
+struct ContactRecord {
+  T s, u;
+  T normal[3];  // then the impulse on places
+  T slip[3];    // then the impulse on velocities
+  T gap;
+};
+
+template <class T>
+struct ContactPairs {
+  const std::int32_t *a, *b;  // [pairs]
+  ContactRecord<T>* record;   // [pairs]
+  unsigned char* active;      // [pairs]
+  std::int32_t* contacts;     // [particles] of the segment
+  std::int32_t count;
+};
+
+struct ContactCounts {
+  long long contacts, crossings;
+};
+
+// Contacts as places are now. For a pack of pairs.
+template <class R>
+struct FindContacts {
+  using T = Scalar<R>;
+  static constexpr int kWidth = Traits<R>::kWidth;
+  ContactPairs<T> pairs;
+  HairPlaces<T> places;
+  T reach;  // largest sum of radii [m]
+
+  RINGLET_FUNCTION void operator()(std::int32_t pack) const {
+    const std::int32_t first = pack * kWidth;
+    const std::int32_t *a = pairs.a + first, *b = pairs.b + first;
+    const SegmentPair<R> pair = gather_pair<R>(places, a, b);
+    const PairContact<R> contact = find_contact(pair, R(reach));
+    const auto radius = [&](const std::int32_t* segment, R at) {
+      const R begin = gather_extra<R>(places.end, segment, 0),
+              end = gather_extra<R>(places.end, segment, kLanes);
+      return fma(at, end - begin, begin);
+    };
+    const R gap = contact.distance - (radius(a, contact.s) + radius(b, contact.u));
+    // Hair that rests on hair is a contact still when the last pass has put its place right.
+    const R touching = R(T(1e-2) * reach);
+    std::uint32_t active = lane_bits((gap < touching) & (dot(contact.normal, contact.normal) > R(T(0.5))));
+    if (pairs.count - first < kWidth) active &= ~(~0u << (pairs.count - first));
+    for (int lane = 0; lane < kWidth; ++lane) pairs.active[first + lane] = active >> lane & 1;
+    if (active == 0) return;
+    const Vector3<R> before = pair.a_start.at(contact.s) - pair.b_start.at(contact.u),
+                     after = pair.a.at(contact.s) - pair.b.at(contact.u);
+    const Vector3<R> slip = contact.later * across(contact.normal, after - before);
+    write(first, active, contact, slip, gap);
+  }
+
+ private:
+  RINGLET_KERNEL void write(std::int32_t first, std::uint32_t active, const PairContact<R>& contact,
+                            Vector3<R> slip, R gap) const {
+    alignas(64) T lanes[9][kWidth];
+    store(lanes[0], contact.s), store(lanes[1], contact.u);
+    store3<R>(lanes[2], kWidth, contact.normal), store3<R>(lanes[5], kWidth, slip), store(lanes[8], gap);
+    const std::uint32_t crossed = lane_bits(contact.crossed);
+    for (std::uint32_t left = active; left; left &= left - 1) {
+      const int lane = __builtin_ctz(left);
+      pairs.record[first + lane] = {lanes[0][lane],
+                                    lanes[1][lane],
+                                    {lanes[2][lane], lanes[3][lane], lanes[4][lane]},
+                                    {lanes[5][lane], lanes[6][lane], lanes[7][lane]},
+                                    lanes[8][lane]};
+      if (crossed >> lane & 1) pairs.active[first + lane] = 2;
+      atomic_add(&pairs.contacts[pairs.a[first + lane]], 1);
+      atomic_add(&pairs.contacts[pairs.b[first + lane]], 1);
+    }
+  }
+};
+
+// Impulses of a pack of pairs, in the place of what they are made of.
+template <class R>
+struct WeighContacts {
+  using T = Scalar<R>;
+  static constexpr int kWidth = Traits<R>::kWidth;
+  ContactPairs<T> pairs;
+  const Place<T>* velocity;  // extra: the particle's freedom, times the contacts that it is shared among
+  T friction;
+
+  RINGLET_FUNCTION void operator()(std::int32_t pack) const {
+    const std::int32_t first = pack * kWidth;
+    alignas(64) T lanes[9][kWidth];
+    bool any_active = false;
+    for (int lane = 0; lane < kWidth; ++lane) any_active = any_active || pairs.active[first + lane];
+    if (!any_active) return;
+    for (int lane = 0; lane < kWidth; ++lane) {
+      const ContactRecord<T>& record = pairs.record[first + lane];
+      lanes[0][lane] = record.s, lanes[1][lane] = record.u, lanes[8][lane] = record.gap;
+      for (int c = 0; c < 3; ++c) lanes[2 + c][lane] = record.normal[c], lanes[5 + c][lane] = record.slip[c];
+    }
+    const R s = load<R>(lanes[0]), u = load<R>(lanes[1]), gap = load<R>(lanes[8]);
+    const Vector3<R> normal = load3<R>(lanes[2], kWidth), slip = load3<R>(lanes[5], kWidth);
+    const std::int32_t *a = pairs.a + first, *b = pairs.b + first;
+    const R c0 = R(1) - s, c1 = s, c2 = R(1) - u, c3 = u;
+    const R inverse_mass =
+        fma(c0 * c0, gather_extra<R>(velocity, a, 0), c1 * c1 * gather_extra<R>(velocity, a, kLanes)) +
+        fma(c2 * c2, gather_extra<R>(velocity, b, 0), c3 * c3 * gather_extra<R>(velocity, b, kLanes));
+    const R per_mass = inverse_or_zero(inverse_mass, R(T(1e-6)));
+    const Vector3<R> speed = gather_segment<R>(velocity, a).at(s) - gather_segment<R>(velocity, b).at(u);
+    const R mu(friction);
+    store3<R>(lanes[2], kWidth, contact_impulse(normal, -gap, slip, mu, per_mass));
+    store3<R>(lanes[5], kWidth,
+              contact_impulse(normal, -dot(normal, speed), across(normal, speed), mu, per_mass));
+    for (int lane = 0; lane < kWidth; ++lane) {
+      ContactRecord<T>& record = pairs.record[first + lane];
+      for (int c = 0; c < 3; ++c) record.normal[c] = lanes[2 + c][lane], record.slip[c] = lanes[5 + c][lane];
+    }
+  }
+};
+
+// The pairs of each segment: [first[segment], first[segment + 1]) of `entry`, which holds a pair's number
+// and, in its lowest bit, whether the segment is its b.
+struct ContactLists {
+  const std::int32_t* first;
+  const std::int32_t* entry;
+};
+
+// Moves the particles of a strand.
+template <class T>
+struct ApplyContacts {
+  ContactPairs<T> pairs;
+  ContactLists lists;
+  const Place<T>* start;  // extra: freedom
+  Place<T>*end, *velocity;
+  const std::int32_t* row;  // [batches + 1]
+  const T* count;           // [batches][kLanes]
+
+  RINGLET_FUNCTION void operator()(std::int32_t strand) const {
+    const std::int32_t batch = strand / kLanes, particles = static_cast<std::int32_t>(count[strand]);
+    std::int32_t particle = row[batch] * kLanes + strand % kLanes;
+    Sum here{};
+    for (std::int32_t i = 0; i < particles; ++i, particle += kLanes) {
+      Sum next{};
+      if (i + 1 < particles && pairs.contacts[particle] > 0) add(particle, here, next);
+      if (here.any && start[particle].extra > T(0)) {
+        move(end[particle], here.place), move(velocity[particle], here.velocity);
+      }
+      here = next;
+    }
+  }
+
+ private:
+  struct Sum {
+    double place[3], velocity[3];
+    bool any;
+  };
+
+  RINGLET_KERNEL void add(std::int32_t segment, Sum& begin, Sum& finish) const {
+    begin.any = finish.any = true;
+    for (std::int32_t k = lists.first[segment]; k < lists.first[segment + 1]; ++k) {
+      const std::int32_t entry = lists.entry[k], pair = entry >> 1;
+      if (!pairs.active[pair]) continue;
+      const ContactRecord<T>& record = pairs.record[pair];
+      const bool second = entry & 1;
+      const double share = second ? record.u : record.s, sign = second ? -1 : 1;
+      for (int c = 0; c < 3; ++c) {
+        split(sign * record.normal[c], share, begin.place[c], finish.place[c]);
+        split(sign * record.slip[c], share, begin.velocity[c], finish.velocity[c]);
+      }
+    }
+  }
+  // Both parts together are what the other segment has, but for the sign.
+  RINGLET_KERNEL static void split(double impulse, double share, double& begin, double& finish) {
+    const double part = summable(share * impulse);
+    finish += part, begin += summable(impulse) - part;
+  }
+  RINGLET_KERNEL static void move(Place<T>& place, const double* by) {
+    place.x = static_cast<T>(place.x + by[0]), place.y = static_cast<T>(place.y + by[1]),
+    place.z = static_cast<T>(place.z + by[2]);
+  }
+};
+
+}  // namespace RINGLET_ISA
+}  // namespace ringlet::kernels

@@ -1,0 +1,262 @@
+// The pairs of segments that contacts look at, found anew in each application.
+#pragma once
+#include "kernels/contact/pair_search.h"
+
+namespace ringlet::kernels {
+inline namespace RINGLET_ISA {
+
+// F, R: the packs of PairSearch.
+template <class Backend, class F, class R>
+class Neighbours {
+ public:
+  using T = Scalar<R>;
+  template <class V>
+  using Buffer = typename Backend::template Buffer<V>;
+
+  // `strand`: [particles] the strand of the segment that begins there, -1 where none does. Returns how many
+  // pairs there are; they hold until the next call.
+  std::int32_t find(Backend& backend, const HairPlaces<T>& places, const std::int32_t* strand,
+                    std::int32_t particles, T reach) {
+    margin_ = T(kMarginReaches) * reach;
+    const float box_margin = static_cast<float>(margin_ + reach);
+    find_mean_motion(backend, places, strand, particles);
+    find_boxes(backend, places, strand, particles, box_margin);
+    fill_table(backend, places, strand, particles);
+    search(backend, places, reach, box_margin);
+    return gather_pairs(backend);
+  }
+
+  std::int32_t* a() { return a_.data(); }
+  std::int32_t* b() { return b_.data(); }
+  std::size_t bytes() const {
+    return sums_.bytes() + box_.bytes() + key_.bytes() + order_.bytes() + first_.bytes() + segment_.bytes() +
+           strand_.bytes() + components_.bytes() + pool_.bytes() + next_.bytes() + last_.bytes() +
+           count_.bytes() + a_.bytes() + b_.bytes();
+  }
+
+ private:
+  // What counts as near, in sums of radii: about as far as contacts move hair in an application.
+  static constexpr double kMarginReaches = 4;
+  static constexpr int kLatticeCells = 20;  // of the mean motion, along the longest axis
+
+  // Lowest and highest of f(particle)[axis] over particles with a segment.
+  template <class Values>
+  void find_bounds(Backend& backend, const std::int32_t* strand, std::int32_t particles, const Values& values,
+                   float* low, float* high) {
+    for (int c = 0; c < 3; ++c) {
+      high[c] = static_cast<float>(
+          backend.largest("contact bounds", particles, -1e30, [=] RINGLET_LAMBDA(std::int32_t p) {
+            return strand[p] < 0 ? -1e30 : static_cast<double>(values(p, c));
+          }));
+      low[c] = static_cast<float>(
+          -backend.largest("contact bounds", particles, -1e30, [=] RINGLET_LAMBDA(std::int32_t p) {
+            return strand[p] < 0 ? -1e30 : -static_cast<double>(values(p, c));
+          }));
+    }
+  }
+
+  void find_mean_motion(Backend& backend, const HairPlaces<T>& places, const std::int32_t* strand,
+                        std::int32_t particles) {
+    float high[3];
+    find_bounds(
+        backend, strand, particles,
+        [=] RINGLET_LAMBDA(std::int32_t p, int c) { return (&places.end[p].x)[c]; }, lattice_.low, high);
+    float size = 1e-3f;
+    for (int c = 0; c < 3; ++c) size = max(size, high[c] - lattice_.low[c]);
+    lattice_.per_cell = static_cast<float>(kLatticeCells) / size;
+    for (int c = 0; c < 3; ++c)
+      lattice_.nodes[c] = static_cast<std::int32_t>((high[c] - lattice_.low[c]) * lattice_.per_cell) + 2;
+    sums_.resize(lattice_.total());
+    MotionSum* sums = sums_.data();
+    backend.parallel_for("clear motion", lattice_.total(),
+                         [=] RINGLET_LAMBDA(std::int32_t k) { sums[k] = MotionSum{}; });
+    const MotionLattice lattice = lattice_;
+    backend.parallel_for("sum motion", particles, [=] RINGLET_LAMBDA(std::int32_t p) {
+      if (strand[p] < 0) return;
+      const Place<T>&end = places.end[p], &start = places.start[p];
+      std::int32_t node[3];
+      for (int c = 0; c < 3; ++c)
+        node[c] = static_cast<std::int32_t>(
+            (static_cast<float>((&end.x)[c]) - lattice.low[c]) * lattice.per_cell + 0.5f);
+      MotionSum& sum = sums[lattice.number(node[0], node[1], node[2])];
+      for (int c = 0; c < 3; ++c)
+        atomic_add(&sum.displacement[c],
+                   static_cast<long long>(((&end.x)[c] - (&start.x)[c]) * (1 / kMotionUnit)));
+      atomic_add(&sum.count, 1LL);
+    });
+  }
+
+  void find_boxes(Backend& backend, const HairPlaces<T>& places, const std::int32_t* strand,
+                  std::int32_t particles, float margin) {
+    box_.resize(particles);
+    Box* boxes = box_.data();
+    const MotionLattice lattice = lattice_;
+    const MotionSum* sums = sums_.data();
+    backend.parallel_for("contact boxes", particles, [=] RINGLET_LAMBDA(std::int32_t p) {
+      if (strand[p] < 0) return;
+      const Place<T>* ends[2] = {&places.end[p], &places.end[p + kLanes]};
+      const Place<T>* starts[2] = {&places.start[p], &places.start[p + kLanes]};
+      float middle[3];
+      for (int c = 0; c < 3; ++c)
+        middle[c] = static_cast<float>(T(0.5) * ((&ends[0]->x)[c] + (&ends[1]->x)[c]));
+      const MeanMotion motion = mean_motion(lattice, sums, middle);
+      Box box;
+      for (int c = 0; c < 3; ++c) {
+        box.low[c] = 3e38f, box.high[c] = -3e38f;
+        for (int k = 0; k < 2; ++k) {
+          const float end = static_cast<float>((&ends[k]->x)[c]),
+                      start = static_cast<float>((&starts[k]->x)[c]) + motion.mean[c];
+          box.low[c] = min(box.low[c], min(start, end)), box.high[c] = max(box.high[c], max(start, end));
+        }
+      }
+      // Neighbours are moved along with the mean motion where they are.
+      const float half = box.half_size();
+      for (int c = 0; c < 3; ++c) {
+        const float more = fma(motion.spread[c], half, 0.5f * margin);
+        box.low[c] -= more, box.high[c] += more;
+      }
+      boxes[p] = box;
+    });
+  }
+
+  void fill_table(Backend& backend, const HairPlaces<T>& places, const std::int32_t* strand,
+                  std::int32_t particles) {
+    const Box* boxes = box_.data();
+    const double segments = backend.sum("contact segments", particles, [=] RINGLET_LAMBDA(std::int32_t p) {
+      return strand[p] < 0 ? 0.0 : 1.0;
+    });
+    const double sizes = backend.sum("contact sizes", particles, [=] RINGLET_LAMBDA(std::int32_t p) {
+      return strand[p] < 0 ? 0.0 : static_cast<double>(boxes[p].half_size());
+    });
+    float low[3], high[3];
+    find_bounds(
+        backend, strand, particles,
+        [=] RINGLET_LAMBDA(std::int32_t p, int c) { return 0.5f * (boxes[p].low[c] + boxes[p].high[c]); },
+        low, high);
+    table_.boxes = static_cast<std::int32_t>(segments);
+    table_.levels = BoxLevels::make(low, high, static_cast<float>(sizes / (segments > 0 ? segments : 1)));
+    sort_boxes(backend, strand, particles);
+    gather_boxes(backend, places, strand);
+  }
+
+  void sort_boxes(Backend& backend, const std::int32_t* strand, std::int32_t particles) {
+    const std::int32_t cells = table_.levels.total_cells;
+    key_.resize(particles), order_.resize(particles), first_.resize(cells + 1);
+    std::uint64_t* keys = key_.data();
+    std::uint32_t* order = order_.data();
+    const Box* boxes = box_.data();
+    const BoxLevels levels = table_.levels;
+    backend.parallel_for("contact cells", particles, [=] RINGLET_LAMBDA(std::int32_t p) {
+      keys[p] = static_cast<std::uint64_t>(strand[p] < 0 ? cells : levels.cell_of(boxes[p]));
+      order[p] = static_cast<std::uint32_t>(p);
+    });
+    int bits = 1;
+    while (cells >> bits) ++bits;
+    backend.sort("sort contacts", key_, order_, particles, bits);
+    std::int32_t* first = first_.data();
+    const std::uint64_t* sorted = key_.data();
+    backend.parallel_for("contact cell starts", particles, [=] RINGLET_LAMBDA(std::int32_t k) {
+      const auto here = static_cast<std::int32_t>(sorted[k]);
+      for (std::int32_t cell = k == 0 ? 0 : static_cast<std::int32_t>(sorted[k - 1]) + 1; cell <= here;
+           ++cell)
+        first[cell] = k;
+      if (k + 1 < particles) return;
+      for (std::int32_t cell = here + 1; cell <= cells; ++cell) first[cell] = particles;
+    });
+  }
+
+  void gather_boxes(Backend& backend, const HairPlaces<T>& places, const std::int32_t* strand) {
+    constexpr int kPad = 16;  // packs read past the end
+    const std::int32_t boxes = table_.boxes, stride = (boxes + 2 * kPad - 1) / kPad * kPad;
+    segment_.resize(boxes), strand_.resize(boxes);
+    components_.resize(static_cast<std::size_t>(stride) * kBoxComponents);
+    float* components = components_.data();
+    std::int32_t *segments = segment_.data(), *strands = strand_.data();
+    const std::uint32_t* order = order_.data();
+    const Box* box = box_.data();
+    backend.parallel_for("gather boxes", stride, [=] RINGLET_LAMBDA(std::int32_t k) {
+      float* to = components + k;
+      const auto put = [&](int which, float value) { to[static_cast<std::int64_t>(which) * stride] = value; };
+      if (k >= boxes) {
+        for (int c = 0; c < kBoxComponents; ++c) put(c, 3e38f);
+        return;
+      }
+      const auto p = static_cast<std::int32_t>(order[k]);
+      segments[k] = p, strands[k] = strand[p];
+      for (int c = 0; c < 3; ++c) {
+        put(c, box[p].low[c]), put(3 + c, box[p].high[c]);
+        const T end[2] = {(&places.end[p].x)[c], (&places.end[p + kLanes].x)[c]};
+        const T start[2] = {(&places.start[p].x)[c], (&places.start[p + kLanes].x)[c]};
+        put(6 + c, static_cast<float>(min(end[0], end[1])));
+        put(9 + c, static_cast<float>(max(end[0], end[1])));
+        put(12 + c, static_cast<float>(min(start[0], start[1])));
+        put(15 + c, static_cast<float>(max(start[0], start[1])));
+      }
+    });
+    table_.first = first_.data(), table_.segment = segments, table_.strand = strands;
+    table_.components = components, table_.stride = stride;
+  }
+
+  // Again with more memory where the pool was too small.
+  void search(Backend& backend, const HairPlaces<T>& places, T reach, float box_margin) {
+    groups_ = (table_.boxes + kGroupSegments - 1) / kGroupSegments;
+    last_.resize(groups_), count_.resize(groups_ + 1), taken_.resize(1);
+    std::int32_t needed = groups_ + groups_ / 2 + 1;
+    do {
+      if (static_cast<std::size_t>(needed) > next_.size())
+        next_.resize(needed), pool_.resize(static_cast<std::size_t>(needed) * kPairBlock);
+      std::int32_t* taken = taken_.data();
+      std::int32_t* end = count_.data() + groups_;
+      backend.parallel_for("clear pool", 1, [=] RINGLET_LAMBDA(std::int32_t) { *taken = *end = 0; });
+      const PairPool pool{pool_.data(), next_.data(), taken, static_cast<std::int32_t>(next_.size()),
+                          last_.data(), count_.data()};
+      const PairSearch<F, R> work{table_, places, box_margin, margin_, reach, pool};
+      backend.parallel_for("contact pairs", groups_, work, kSearchChunk);
+      needed = static_cast<std::int32_t>(backend.largest(
+          "pool", 1, 0, [=] RINGLET_LAMBDA(std::int32_t) { return static_cast<double>(*taken); }));
+    } while (needed > static_cast<std::int32_t>(next_.size()));
+  }
+
+  // From the groups' blocks into one list, in the order of the table.
+  std::int32_t gather_pairs(Backend& backend) {
+    const std::int32_t pairs = backend.scan("count pairs", count_, groups_ + 1);
+    constexpr int kPad = 16;
+    a_.resize(pairs + kPad), b_.resize(pairs + kPad);
+    std::int32_t *a = a_.data(), *b = b_.data();
+    const SegmentNumbers* pool = pool_.data();
+    const std::int32_t *next = next_.data(), *last = last_.data(), *first = count_.data();
+    backend.parallel_for(
+        "gather pairs", groups_,
+        [=] RINGLET_LAMBDA(std::int32_t group) {
+          const std::int32_t begin = first[group];
+          std::int32_t count = first[group + 1] - begin;
+          for (std::int32_t block = last[group]; count > 0; block = next[block]) {
+            const std::int32_t from = (count - 1) / kPairBlock * kPairBlock;
+            for (std::int32_t k = from; k < count; ++k) {
+              const SegmentNumbers& pair = pool[static_cast<std::int64_t>(block) * kPairBlock + k - from];
+              a[begin + k] = pair.a, b[begin + k] = pair.b;
+            }
+            count = from;
+          }
+        },
+        kSearchChunk);
+    return pairs;
+  }
+
+  static constexpr int kSearchChunk = 8;  // groups
+
+  T margin_ = T(0);
+  MotionLattice lattice_{};
+  BoxTable table_{};
+  std::int32_t groups_ = 0;
+  Buffer<MotionSum> sums_;
+  Buffer<Box> box_;
+  Buffer<std::uint64_t> key_;
+  Buffer<std::uint32_t> order_;
+  Buffer<std::int32_t> first_, segment_, strand_, next_, last_, count_, taken_, a_, b_;
+  Buffer<float> components_;
+  Buffer<SegmentNumbers> pool_;
+};
+
+}  // namespace RINGLET_ISA
+}  // namespace ringlet::kernels

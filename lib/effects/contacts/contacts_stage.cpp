@@ -1,0 +1,145 @@
+#include "effects/contacts/contacts_stage.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+
+#include "effects/lengths.h"
+#include "kernels/launch/contacts.h"
+
+namespace ringlet::effects {
+namespace {
+
+using kernels::InstructionSet;
+
+// The executor's instruction set, or this processor's widest where the executor steps on a device: the
+// contacts are found on the CPU.
+InstructionSet instruction_set(const std::string& name) {
+  for (const InstructionSet set : {InstructionSet::kGeneric, InstructionSet::kAvx2, InstructionSet::kAvx512})
+    if (name == kernels::name_of(set)) return set;
+  return kernels::best_instruction_set();
+}
+
+void run_chunks(void*, int chunks, void (*body)(const void* context, int chunk), const void* context) {
+  tbb::parallel_for(0, chunks, [=](int chunk) { body(context, chunk); });
+}
+
+// The kernels' memory.
+template <class T>
+class Contacts {
+ public:
+  explicit Contacts(InstructionSet set)
+      : table_(kernels::cpu_hair_contacts<T>(set)), memory_(table_.make({run_chunks, nullptr})) {}
+  ~Contacts() { table_.destroy(memory_); }
+  Contacts(const Contacts&) = delete;
+  Contacts& operator=(const Contacts&) = delete;
+
+  kernels::HairContactFigures apply(const kernels::HairContactStep<T>& step) {
+    return table_.apply(memory_, step);
+  }
+  std::size_t bytes() const { return table_.bytes(memory_); }
+
+ private:
+  const kernels::HairContactTable<T>& table_;
+  kernels::HairContactMemory* memory_;
+};
+
+template <class T>
+class ContactsStage : public Stage<T> {
+ public:
+  ContactsStage(const scene::Scene& scene, const state::StrandModel<T>& model, state::StrandState<T>& state,
+                const Executor<T>& executor)
+      : scene_(scene),
+        options_(*scene.effects.hair_hair->contacts),
+        model_(model),
+        state_(state),
+        contacts_(instruction_set(executor.instruction_set())),
+        start_(state.position.size()),
+        start_root_points_(state.root_points.size()),
+        lengths_(scene, model, state) {}
+
+  std::string name() const override { return "contacts"; }
+  std::size_t bytes() const override {
+    return contacts_.bytes() + lengths_.bytes() + start_.size() * sizeof(T) +
+           start_root_points_.size() * sizeof(double);
+  }
+  // Of the device, which only holds the lengths.
+  std::int64_t launches() const override {
+    if (!scene_.effects.inextensible) return 0;
+    return kRounds * (each_substep() ? scene_.model.substeps : 1);
+  }
+  std::int64_t diverged_strand() const override { return lengths_.diverged_strand(); }
+
+  // Contacts are found over all the way since here: since the frame began, or the substep.
+  void begin(Executor<T>& executor, const Substep& substep) override {
+    if (!substep.first_of_frame && !each_substep()) return;
+    if (!substep.first_of_frame) executor.fetch(state_);  // at the frame's start the host has the state
+    std::copy(state_.position.begin(), state_.position.end(), start_.begin());
+    std::copy(state_.root_points.begin(), state_.root_points.end(), start_root_points_.begin());
+  }
+
+  void run(Executor<T>& executor, const Substep& substep, FrameReport& report) override {
+    if (!substep.last_of_frame && !each_substep()) return;
+    executor.fetch(state_);
+    for (int round = 0; round < kRounds; ++round) {
+      const kernels::HairContactFigures found = contacts_.apply(step());
+      gather(found, round, report);
+      executor.submit(state_);
+      lengths_.hold(executor, substep, substep.step * (each_substep() ? 1 : scene_.model.substeps), report);
+      if (round + 1 < kRounds) executor.fetch(state_);
+    }
+  }
+
+ private:
+  static constexpr int kRounds = 1;
+
+  bool each_substep() const { return options_.cadence == scene::Cadence::kSubstep; }
+
+  kernels::HairContactStep<T> step() {
+    kernels::HairContactStep<T> step{};
+    step.batches = model_.view();
+    step.row_count = static_cast<std::int32_t>(model_.layout.rows());
+    step.state = state_.view();
+    step.start = start_.data();
+    step.start_root_points = start_root_points_.data();
+    step.root_points = state_.root_points.data();
+    step.radius = model_.radius.data();
+    step.clamped = scene_.model.clamped_particles;
+    step.friction = static_cast<T>(options_.friction);
+    step.passes = options_.passes;
+    return step;
+  }
+
+  void gather(const kernels::HairContactFigures& found, int, FrameReport& report) {
+    report.contact_pairs += static_cast<double>(found.pairs);
+    report.contacts += static_cast<double>(found.contacts);
+    report.crossings += static_cast<double>(found.crossings);
+    report.contact_depth = std::max(report.contact_depth, found.depth);
+  }
+
+  const scene::Scene& scene_;
+  const scene::HairContacts& options_;
+  const state::StrandModel<T>& model_;
+  state::StrandState<T>& state_;
+  Contacts<T> contacts_;
+  state::AlignedVector<T> start_;
+  state::AlignedVector<double> start_root_points_;
+  Lengths<T> lengths_;
+};
+
+}  // namespace
+
+template <class T>
+std::unique_ptr<Stage<T>> make_contacts_stage(const scene::Scene& scene, const state::StrandModel<T>& model,
+                                              state::StrandState<T>& state, Executor<T>& executor) {
+  return std::make_unique<ContactsStage<T>>(scene, model, state, executor);
+}
+
+template std::unique_ptr<Stage<float>> make_contacts_stage(const scene::Scene&,
+                                                           const state::StrandModel<float>&,
+                                                           state::StrandState<float>&, Executor<float>&);
+template std::unique_ptr<Stage<double>> make_contacts_stage(const scene::Scene&,
+                                                            const state::StrandModel<double>&,
+                                                            state::StrandState<double>&, Executor<double>&);
+
+}  // namespace ringlet::effects

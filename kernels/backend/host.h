@@ -67,6 +67,7 @@ class Host {
  public:
   template <class T>
   using Buffer = HostBuffer<T>;
+  using Lent = HostThreads;
   static constexpr int kChunk = 2048;
 
   explicit Host(HostThreads threads) : threads_(threads) {}

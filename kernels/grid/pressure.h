@@ -29,21 +29,20 @@ struct Pressure {
   template <class V>
   using Buffer = typename Backend::template Buffer<V>;
 
-  // To be filled by the caller: multigrid.level[0]'s keys and neighbours, then `prepare`; `face`
-  // [kDirections] [cells] c_f to a neighbour in the set of all cells, 0 where there is none; `open` [cells]
-  // the sum of c_f over all faces, those to the outside as well; `right` [cells] b.
+  // To be filled by the caller after `resize`, before `prepare`: multigrid.level[0]'s keys and neighbours;
+  // `face` [kDirections] [cells] c_f to a neighbour in the set of all cells, 0 where there is none; `open`
+  // [cells] the sum of c_f over all faces, those to the outside as well; `right` [cells] b.
   Multigrid<Backend, T> multigrid;
   Buffer<T> face, open, right;
   Buffer<double> pressure;  // [cells] the answer
 
   std::int32_t cells() const { return multigrid.level[0].cells; }
 
-  void prepare(Backend& backend) {
-    multigrid.build(backend);
-    const std::size_t n = cells();
+  void resize(std::size_t n) {
     face.resize(kDirections * n), open.resize(n), right.resize(n), pressure.resize(n);
     direction.resize(n), image.resize(n), violation.resize(n);
   }
+  void prepare(Backend& backend) { multigrid.build(backend); }
 
   // What could not be reached in `most_iterations` is told by the figures.
   PressureFigures solve(Backend& backend, double tolerance, int most_iterations) {

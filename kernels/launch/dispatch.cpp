@@ -1,5 +1,7 @@
 #include "kernels/launch/launch.h"
 
+#include <initializer_list>
+
 namespace ringlet::kernels {
 
 #define RINGLET_DECLARE(isa)                       \
@@ -30,6 +32,12 @@ const char* name_of(InstructionSet set) {
       break;
   }
   return "generic";
+}
+
+InstructionSet instruction_set_named(const char* name) {
+  for (const InstructionSet set : {InstructionSet::kGeneric, InstructionSet::kAvx2, InstructionSet::kAvx512})
+    if (__builtin_strcmp(name, name_of(set)) == 0) return set;
+  return best_instruction_set();
 }
 
 template <>

@@ -1,0 +1,138 @@
+// The fluid's cells, their operator and what the pressure does to the faces.
+//
+//   (A p)_i = sum over faces of w_f / m_f (p_i - p_j),   b_i = d_i - sum of (w_f u_f + (1 - w_f) u_wall)
+//
+// with w_f a face's open share, m_f its mass, the sum running outward, and d the least divergence that the
+// density allows. Then u_f -= (p_above - p_below) / m_f: mass times change adds up to nothing away from
+// walls, whatever the residual, so momentum is kept.
+#pragma once
+#include "kernels/grid/walls.h"
+
+namespace ringlet::kernels {
+inline namespace RINGLET_ISA {
+
+// The node next to a node along an axis, in the direction of `step` (1 or -1); -1 where there is no tile.
+template <class T>
+RINGLET_FUNCTION std::int64_t next_node(const GridData<T>& g, std::int64_t node, int axis, int step) {
+  const int cell = static_cast<int>(node % kTileCells), at = coordinate_in_tile(cell, axis) + step;
+  const int rest = cell & ~(9 << axis), within = at & 3;
+  const int next = rest | ((within & 1) | (within & 2) << 2) << axis;
+  std::int64_t tile = node / kTileCells;
+  if (at < 0 || at >= kTileEdge) {
+    constexpr int kStride[3] = {1, 3, 9};
+    tile = g.near[tile * kAround + kAround / 2 + step * kStride[axis]];
+    if (tile < 0) return -1;
+  }
+  return tile * kTileCells + next;
+}
+
+// The number of a fluid cell, -1 for another.
+template <class T>
+RINGLET_FUNCTION std::int32_t fluid_cell(const GridData<T>& g, std::int64_t node) {
+  if (node < 0) return -1;
+  const std::int64_t tile = node / kTileCells;
+  const std::uint64_t bit = std::uint64_t{1} << (node % kTileCells), mask = g.fluid[tile];
+  return mask & bit ? g.first_cell[tile] + ones(mask & (bit - 1)) : -1;
+}
+
+template <class T>
+RINGLET_FUNCTION std::uint64_t fluid_cells(const GridData<T>& g, std::int32_t tile) {
+  std::uint64_t mask = 0;
+  for (int cell = 0; cell < kTileCells; ++cell) {
+    const T* values = g.node + (static_cast<std::int64_t>(tile) * kTileCells + cell) * kNodeValues;
+    if (values[kDensity] > static_cast<T>(kFluidShare) * values[kTarget] && values[kTarget] > T(0))
+      mask |= std::uint64_t{1} << cell;
+  }
+  return mask;
+}
+
+// 1 / mass of a node's faces, 0 where neither cell beside it is fluid.
+template <class T>
+RINGLET_FUNCTION void find_lightness(const GridData<T>& g, std::int64_t node) {
+  const bool above = fluid_cell(g, node) >= 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const int value = kFaceMass + 2 * axis;
+    const std::int64_t below = next_node(g, node, axis, -1);
+    T mass = T(0);
+    const auto at_least = [&](std::int64_t opposite) {
+      if (opposite >= 0)
+        mass = max(mass, static_cast<T>(kLeastFaceShare) * g.node[opposite * kNodeValues + value]);
+    };
+    const bool beside = fluid_cell(g, below) >= 0;
+    if (above) at_least(next_node(g, node, axis, 1));
+    if (beside) at_least(below);
+    if (above || beside) mass = max(mass, g.node[node * kNodeValues + value]);
+    g.lightness[node * 3 + axis] = mass > T(0) ? T(1) / mass : T(0);
+  }
+}
+
+// A fluid cell's row of the operator, and how much flows out of it.
+template <class T>
+struct CellRow {
+  T face[kDirections], open = T(0), outflow = T(0);
+  std::int32_t neighbour[kDirections];
+
+  RINGLET_FUNCTION CellRow(const GridData<T>& g, std::int64_t node, std::int32_t number) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const std::int64_t high = next_node(g, node, axis, 1);
+      const T below = velocity(g, node, axis), beyond = velocity(g, high, axis);
+      const bool hair_below = mass(g, node, axis) > T(0), hair_beyond = mass(g, high, axis) > T(0);
+      // Where a face has no hair nothing crosses it faster than the other side.
+      add(g, node, axis, 2 * axis, next_node(g, node, axis, -1), number, -(hair_below ? below : beyond));
+      add(g, high, axis, 2 * axis + 1, high, number, hair_beyond ? beyond : below);
+    }
+  }
+
+ private:
+  RINGLET_FUNCTION static T mass(const GridData<T>& g, std::int64_t node, int axis) {
+    return g.node[node * kNodeValues + kFaceMass + 2 * axis];
+  }
+  RINGLET_FUNCTION static T velocity(const GridData<T>& g, std::int64_t node, int axis) {
+    return g.node[node * kNodeValues + kFaceMass + 2 * axis + 1];
+  }
+  // `outward`: the hair's velocity out of the cell through this face.
+  RINGLET_FUNCTION void add(const GridData<T>& g, std::int64_t face_node, int axis, int direction,
+                            std::int64_t beside, std::int32_t number, T outward) {
+    const Opening<T> opening = opening_of(g, face_node, axis);
+    const T c = opening.share * g.lightness[face_node * 3 + axis];
+    const std::int32_t other = fluid_cell(g, beside);
+    neighbour[direction] = other < 0 ? number : other;
+    face[direction] = other < 0 ? T(0) : c;
+    open += c;
+    const T wall = direction & 1 ? opening.velocity : -opening.velocity;
+    outflow += fma(opening.share, outward, (T(1) - opening.share) * wall);
+  }
+};
+
+// The least divergence that a cell's density allows within one step: negative below the target. 0 over it:
+// that is no matter of velocity.
+template <class T>
+RINGLET_FUNCTION T least_divergence(const T* values) {
+  return min(T(0), T(1) - values[kTarget] / values[kDensity]);
+}
+
+// The divergence of displacement that brings a cell to its target, or that it has to spare.
+template <class T>
+RINGLET_FUNCTION T wanted_divergence(const T* values) {
+  const T wanted = T(1) - values[kTarget] / values[kDensity];
+  return min(wanted, static_cast<T>(kMostCorrection));
+}
+
+// The change that pressure makes to a node's faces takes the place of their masses.
+template <class T>
+RINGLET_FUNCTION void press_node(const GridData<T>& g, const double* pressure, T most, std::int64_t node) {
+  const std::int32_t cell = fluid_cell(g, node);
+  const double above = cell < 0 ? 0 : pressure[cell];
+  for (int axis = 0; axis < 3; ++axis) {
+    T change = T(0);
+    const T lightness = g.lightness[node * 3 + axis];
+    if (lightness > T(0) && opening_of(g, node, axis).share > T(0)) {
+      const std::int32_t other = fluid_cell(g, next_node(g, node, axis, -1));
+      change = lightness * static_cast<T>((other < 0 ? 0 : pressure[other]) - above);
+    }
+    g.node[node * kNodeValues + kFaceMass + 2 * axis] = min(max(change, -most), most);
+  }
+}
+
+}  // namespace RINGLET_ISA
+}  // namespace ringlet::kernels

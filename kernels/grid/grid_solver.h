@@ -1,0 +1,470 @@
+// Hair against hair as a fluid: one run of the grid reads like its table of contents (grid_step.h has the
+// terms).
+#pragma once
+#include "kernels/grid/fluid.h"
+#include "kernels/grid/pressure.h"
+#include "kernels/launch/hair_grid.h"
+
+namespace ringlet::kernels {
+
+inline namespace RINGLET_ISA {
+
+template <class Backend, class T>
+class GridSolver final : public HairGrid<T> {
+ public:
+  template <class V>
+  using Buffer = typename Backend::template Buffer<V>;
+
+  explicit GridSolver(const typename Backend::Lent& lent) : backend_(lent) {}
+
+  void at_rest(const GridStep<T>& step) override {
+    number_particles(step);
+    if (data_.particles == 0) return;
+    const GridData<T>& g = data_;
+    backend_.parallel_for("grid: rest", samples_, [g] RINGLET_LAMBDA(int s) { g.rest_density[s] = T(1); });
+    most_rest_density_ = 1;
+    fill();
+    const double hair = sum_nodes([] RINGLET_LAMBDA(double density) { return density; });
+    const double square = sum_nodes([] RINGLET_LAMBDA(double density) { return density * density; });
+    const double mean = hair > 0 ? square / hair : 0;
+    const T least = static_cast<T>(mean > kLeastStrands ? mean : kLeastStrands);
+    backend_.parallel_for(
+        "grid: rest density", g.occupied,
+        [g = data_, least] RINGLET_LAMBDA(int tile) { rest_densities(g, least, tile); }, kTileChunk);
+    most_rest_density_ = backend_.largest("grid: rest density", samples_, 1, [g] RINGLET_LAMBDA(int s) {
+      return static_cast<double>(g.rest_density[s]);
+    });
+  }
+
+  GridFigures run(const GridStep<T>& step) override {
+    GridFigures figures;
+    data_.step = step;
+    if (data_.particles == 0) return figures;
+    fill();
+    find_walls();
+    find_fluid();
+    figures.cells = data_.cells;
+    figures.density = densest();
+    if (data_.cells > 0) assemble();
+    keep_volume(figures);
+    if (figures.density > 1 + kOverDense) move_apart(figures);
+    return figures;
+  }
+
+  std::size_t bytes() const override {
+    return backend_.bytes() + pressure_.bytes() + first_particle_.bytes() + ends_.bytes() +
+           first_sample_.bytes() + rest_density_.bytes() + particle_.bytes() + first_piece_.bytes() +
+           piece_.bytes() + piece_key_.bytes() + piece_of_.bytes() + given_back_.bytes() + tile_key_.bytes() +
+           near_.bytes() + occupied_key_.bytes() + occupied_tile_.bytes() + tile_piece_.bytes() +
+           flag_.bytes() + around_key_.bytes() + around_.bytes() + sums_.bytes() + node_.bytes() +
+           lightness_.bytes() + wall_.bytes() + opening_.bytes() + wall_tile_.bytes() + fluid_.bytes() +
+           first_cell_.bytes();
+  }
+
+  // ---- The strands' numbers
+
+  void number_particles(const GridStep<T>& step) {
+    data_ = {};
+    data_.step = step;
+    data_.lanes = step.batches.batches * kLanes;
+    first_particle_.resize(data_.lanes + 1);
+    std::int32_t* first = first_particle_.data();
+    const StrandBatches<T> batches = step.batches;
+    const std::int32_t lanes = data_.lanes;
+    backend_.parallel_for("grid: strands", lanes + 1, [=] RINGLET_LAMBDA(int strand) {
+      const std::int32_t count = strand < lanes ? static_cast<std::int32_t>(batches.count[strand]) : 0;
+      first[strand] = count > 1 ? count : 0;
+    });
+    data_.particles = backend_.scan("grid: strands", first_particle_, lanes + 1);
+    data_.first_particle = first;
+    ends_.resize(data_.particles + 1), first_sample_.resize(data_.particles + 1);
+    particle_.resize(std::size_t{8} * (data_.particles + 1)), first_piece_.resize(data_.particles + 1);
+    number_samples(step);
+  }
+
+  // As many of a segment as it is cells long at rest.
+  void number_samples(const GridStep<T>& step) {
+    unsigned char* ends = ends_.data();
+    std::int32_t* samples = first_sample_.data();
+    const GridData<T> g = data_;
+    backend_.parallel_for("grid: samples", g.lanes, [=] RINGLET_LAMBDA(int strand) {
+      const int first = g.first_particle[strand], count = g.first_particle[strand + 1] - first;
+      const std::int64_t row = g.step.batches.row[strand / kLanes];
+      for (int i = 0; i < count; ++i) {
+        const T length = g.step.batches.rest_length[(row + i) * 3 * kLanes + strand % kLanes];
+        const T cells = length / static_cast<T>(g.step.axes.cell);
+        const bool last = i + 1 == count;
+        ends[first + i] =
+            static_cast<unsigned char>((i == 0 ? kFirstOfStrand : 0) | (last ? kLastOfStrand : 0));
+        samples[first + i] = last ? 0 : 1 + static_cast<std::int32_t>(min(cells, T(kMostSamples)));
+      }
+    });
+    const std::int32_t particles = data_.particles;
+    backend_.parallel_for("grid: samples", 1,
+                          [=] RINGLET_LAMBDA(int) { samples[particles] = 0, ends[particles] = 0; });
+    samples_ = backend_.scan("grid: samples", first_sample_, particles + 1);
+    rest_density_.resize(samples_);
+    data_.ends = ends, data_.first_sample = samples, data_.rest_density = rest_density_.data();
+    data_.particle = particle_.data(), data_.first_piece = first_piece_.data();
+    data_.step = step;
+  }
+
+  // ---- From strands to nodes
+
+  void fill() {
+    backend_.parallel_for(
+        "grid: place", data_.lanes, [g = data_] RINGLET_LAMBDA(int s) { place_strand(g, s); }, 256);
+    const int bits = find_bounds();
+    cut_pieces(bits);
+    find_tiles(bits);
+    scatter();
+  }
+
+  // The coordinates of the lowest tile, one lower for the halo; returns how many bits a key needs.
+  int find_bounds() {
+    const GridData<T>& g = data_;
+    const T* particle = g.particle;
+    int bits = 1;
+    for (int c = 0; c < 3; ++c) {
+      const auto bound = [&](T sign) {
+        return static_cast<std::int32_t>(
+            backend_.largest("grid: bounds", g.particles, -kFarCells, [=] RINGLET_LAMBDA(int i) {
+              return static_cast<double>(sign) *
+                     tile_coordinate(cell_coordinate(particle[static_cast<std::int64_t>(i) * 8 + c]));
+            }));
+      };
+      data_.low[c] = -bound(T(-1)) - 1;
+      while (bound(T(1)) + 1 - data_.low[c] >= 1 << bits) ++bits;
+    }
+    return 3 * bits;
+  }
+
+  void cut_pieces(int bits) {
+    std::int32_t* count = first_piece_.data();
+    backend_.parallel_for("grid: count pieces", data_.particles, [g = data_, count] RINGLET_LAMBDA(int i) {
+      std::int32_t pieces = 0;
+      for_each_piece(g, i, [&](std::int32_t, std::uint64_t) { ++pieces; });
+      count[i] = pieces;
+    });
+    const std::int32_t particles = data_.particles;
+    backend_.parallel_for("grid: count pieces", 1, [=] RINGLET_LAMBDA(int) { count[particles] = 0; });
+    data_.pieces = backend_.scan("grid: count pieces", first_piece_, particles + 1);
+    piece_.resize(data_.pieces + 1), piece_key_.resize(data_.pieces), piece_of_.resize(data_.pieces);
+    given_back_.resize(std::size_t{6} * data_.pieces);
+    data_.piece = piece_.data(), data_.given_back = given_back_.data();
+    data_.piece_key = piece_key_.data(), data_.piece_of = piece_of_.data();
+    backend_.parallel_for("grid: cut pieces", data_.particles, [g = data_] RINGLET_LAMBDA(int i) {
+      std::int32_t piece = g.first_piece[i];
+      for_each_piece(g, i, [&](std::int32_t sample, std::uint64_t key) {
+        g.piece[piece] = {i, sample}, g.piece_key[piece] = key;
+        g.piece_of[piece] = static_cast<std::uint32_t>(piece), ++piece;
+      });
+      if (i + 1 == g.particles) g.piece[g.pieces] = {-1, 0};
+    });
+    backend_.sort("grid: sort pieces", piece_key_, piece_of_, data_.pieces, bits);
+    data_.piece_key = piece_key_.data(), data_.piece_of = piece_of_.data();
+  }
+
+  // The tiles that pieces lie in, those about them, and where each tile's neighbours are.
+  void find_tiles(int bits) {
+    occupied_key_.resize(data_.pieces);
+    tile_piece_.resize(data_.pieces + 1);
+    data_.occupied = unique(piece_key_.data(), data_.pieces, occupied_key_, &tile_piece_);
+    data_.tile_piece = tile_piece_.data();
+    const std::int32_t candidates = data_.occupied * kAround;
+    around_key_.resize(candidates), around_.resize(candidates);
+    std::uint64_t* around = around_key_.data();
+    const std::uint64_t* occupied = occupied_key_.data();
+    backend_.parallel_for("grid: dilate", candidates, [=] RINGLET_LAMBDA(int n) {
+      std::uint64_t key = occupied[n / kAround];
+      int place = n % kAround;
+      for (int axis = 0; axis < 3; ++axis, place /= 3) {
+        if (place % 3 == 0) key = key_before(key, axis);
+        if (place % 3 == 2) key = key_after(key, axis);
+      }
+      around[n] = key;
+    });
+    backend_.sort("grid: dilate", around_key_, around_, candidates, bits);
+    tile_key_.resize(candidates);
+    data_.tiles = unique(around_key_.data(), candidates, tile_key_, nullptr);
+    find_neighbours();
+  }
+
+  // The different keys of a sorted list, and where each begins.
+  std::int32_t unique(const std::uint64_t* sorted, std::int32_t n, Buffer<std::uint64_t>& different,
+                      Buffer<std::int32_t>* begin) {
+    flag_.resize(n + 1);
+    std::int32_t* number = flag_.data();
+    backend_.parallel_for("grid: different tiles", n + 1, [=] RINGLET_LAMBDA(int i) {
+      number[i] = i < n && (i == 0 || sorted[i] != sorted[i - 1]) ? 1 : 0;
+    });
+    const std::int32_t count = backend_.scan("grid: different tiles", flag_, n + 1);
+    std::uint64_t* to = different.data();
+    std::int32_t* starts = begin ? begin->data() : nullptr;
+    backend_.parallel_for("grid: different tiles", n, [=] RINGLET_LAMBDA(int i) {
+      if (i > 0 && sorted[i] == sorted[i - 1]) return;
+      to[number[i]] = sorted[i];
+      if (starts) starts[number[i]] = i;
+    });
+    if (starts)
+      backend_.parallel_for("grid: different tiles", 1, [=] RINGLET_LAMBDA(int) { starts[count] = n; });
+    return count;
+  }
+
+  void find_neighbours() {
+    near_.resize(std::size_t{kAround} * data_.tiles), occupied_tile_.resize(data_.occupied);
+    data_.tile_key = tile_key_.data(), data_.near = near_.data();
+    std::int32_t* tile_of = occupied_tile_.data();
+    data_.occupied_tile = tile_of;
+    const std::uint64_t* occupied = occupied_key_.data();
+    backend_.parallel_for(
+        "grid: tiles", data_.occupied,
+        [g = data_, tile_of, occupied] RINGLET_LAMBDA(int t) {
+          tile_of[t] = find_key(g.tile_key, g.tiles, occupied[t]);
+        },
+        kTileChunk);
+    backend_.parallel_for(
+        "grid: neighbours", data_.tiles, [g = data_] RINGLET_LAMBDA(int tile) { find_near(g, tile); },
+        kTileChunk);
+  }
+
+  void scatter() {
+    const std::size_t nodes = static_cast<std::size_t>(data_.tiles) * kTileCells;
+    sums_.resize(nodes * kNodeValues), node_.resize(nodes * kNodeValues), lightness_.resize(nodes * 3);
+    data_.sums = sums_.data(), data_.node = node_.data(), data_.lightness = lightness_.data();
+    choose_scale();
+    backend_.parallel_for(
+        "grid: clear", data_.tiles,
+        [g = data_] RINGLET_LAMBDA(int tile) {
+          Fixed<T>* sums = g.sums + static_cast<std::int64_t>(tile) * kTileCells * kNodeValues;
+          for (int v = 0; v < kTileCells * kNodeValues; ++v) sums[v] = 0;
+        },
+        kTileChunk);
+    for (std::uint64_t colour = 0; colour < 8;
+         ++colour)  // a key's lowest bits: no two of a colour are neighbours
+      backend_.parallel_for(
+          "grid: scatter", data_.occupied,
+          [g = data_, colour] RINGLET_LAMBDA(int t) {
+            if ((g.tile_key[g.occupied_tile[t]] & 7) == colour) scatter_tile(g, t);
+          },
+          2 * kTileChunk);
+    backend_.parallel_for(
+        "grid: nodes", data_.tiles,
+        [g = data_] RINGLET_LAMBDA(int tile) {
+          for (int cell = 0; cell < kTileCells; ++cell)
+            finish_node(g, static_cast<std::int64_t>(tile) * kTileCells + cell);
+        },
+        kTileChunk);
+  }
+
+  // As fine as the largest sum allows: a node gets from no more than eight tiles.
+  void choose_scale() {
+    const double samples =
+        backend_.largest("grid: samples", data_.occupied, 1, [g = data_] RINGLET_LAMBDA(int t) {
+          double count = 0;
+          for_each_piece_of_tile(g, t, [&](std::uint32_t, const Segment<T>&, Piece piece, std::int32_t end) {
+            count += end - piece.first;
+          });
+          return count;
+        });
+    const T* particle = data_.particle;
+    const double speed = backend_.largest("grid: speed", data_.particles, 1e-30, [=] RINGLET_LAMBDA(int i) {
+      const T* u = particle + static_cast<std::int64_t>(i) * 8 + 4;
+      return static_cast<double>(max(abs(u[0]), max(abs(u[1]), abs(u[2]))));
+    });
+    constexpr int kMostWeight = kMostSampleLength > kMostSampleMass ? kMostSampleLength : kMostSampleMass;
+    const double unit = 0.9 * FixedPoint<T>::kRange / (8.0 * kMostWeight * samples);
+    for (int v = 0; v < kNodeValues; ++v) data_.scale[v] = static_cast<T>(unit);
+    data_.scale[kTarget] = static_cast<T>(unit / most_rest_density_);
+    for (int v = kFaceMass + 1; v < kNodeValues; v += 2) data_.scale[v] = static_cast<T>(unit / speed);
+  }
+
+  template <class F>
+  double sum_nodes(const F& f) {
+    return backend_.sum("grid: sum", data_.tiles, [g = data_, f] RINGLET_LAMBDA(int tile) {
+      double sum = 0;
+      for (int cell = 0; cell < kTileCells; ++cell)
+        sum += f(static_cast<double>(
+            g.node[(static_cast<std::int64_t>(tile) * kTileCells + cell) * kNodeValues + kDensity]));
+      return sum;
+    });
+  }
+
+  // ---- Cells
+
+  void find_walls() {
+    wall_.resize(data_.tiles + 1);
+    std::int32_t* wall = wall_.data();
+    data_.wall = wall;
+    backend_.parallel_for(
+        "grid: near walls", data_.tiles + 1,
+        [g = data_] RINGLET_LAMBDA(int tile) { g.wall[tile] = tile < g.tiles && near_wall(g, tile) ? 1 : 0; },
+        kTileChunk);
+    const std::int32_t walls = backend_.scan("grid: near walls", wall_, data_.tiles + 1);
+    wall_tile_.resize(walls), opening_.resize(static_cast<std::size_t>(walls) * kTileCells * kWallValues);
+    std::int32_t* tile_of = wall_tile_.data();
+    data_.opening = opening_.data();
+    const std::int32_t tiles = data_.tiles;
+    backend_.parallel_for("grid: near walls", 1, [=] RINGLET_LAMBDA(int) {
+      for (int tile = 0; tile < tiles; ++tile) {
+        const bool is_near = wall[tile + 1] != wall[tile];
+        if (is_near)
+          tile_of[wall[tile]] = tile;
+        else
+          wall[tile] = -1;
+      }
+    });
+    backend_.parallel_for(
+        "grid: walls", walls * kTileCells,
+        [g = data_, tile_of] RINGLET_LAMBDA(int n) {
+          find_openings(g, tile_of[n / kTileCells], n % kTileCells);
+        },
+        kTileCells);
+  }
+
+  void find_fluid() {
+    fluid_.resize(data_.tiles), first_cell_.resize(data_.tiles + 1);
+    data_.fluid = fluid_.data();
+    std::int32_t* count = first_cell_.data();
+    backend_.parallel_for(
+        "grid: fluid", data_.tiles + 1,
+        [g = data_, count] RINGLET_LAMBDA(int tile) {
+          count[tile] = tile < g.tiles ? ones(g.fluid[tile] = fluid_cells(g, tile)) : 0;
+        },
+        kTileChunk);
+    data_.cells = backend_.scan("grid: fluid", first_cell_, data_.tiles + 1);
+    data_.first_cell = count;
+  }
+
+  // The largest density over its target.
+  double densest() {
+    return backend_.largest("grid: densest", data_.tiles, 0, [g = data_] RINGLET_LAMBDA(int tile) {
+      double most = 0;
+      for_each_cell(g, tile, [&](std::int64_t node, std::int32_t) {
+        const T* values = g.node + node * kNodeValues;
+        const double share = static_cast<double>(values[kDensity]) / static_cast<double>(values[kTarget]);
+        most = share > most ? share : most;
+      });
+      return most;
+    });
+  }
+
+  // The operator, and by how much each cell would be compressed in the interval beyond what it may.
+  void assemble() {
+    backend_.parallel_for(
+        "grid: lightness", data_.tiles,
+        [g = data_] RINGLET_LAMBDA(int tile) {
+          for (int cell = 0; cell < kTileCells; ++cell)
+            find_lightness(g, static_cast<std::int64_t>(tile) * kTileCells + cell);
+        },
+        kTileChunk);
+    auto& fine = pressure_.multigrid.level[0];
+    fine.resize(data_.cells);
+    pressure_.resize(data_.cells);
+    std::uint64_t* key = fine.key.data();
+    std::int32_t* neighbour = fine.neighbour.data();
+    T *face = pressure_.face.data(), *open = pressure_.open.data(), *right = pressure_.right.data();
+    const T rate = static_cast<T>(data_.step.axes.cell / data_.step.interval);
+    backend_.parallel_for(
+        "grid: assemble", data_.tiles,
+        [=, g = data_] RINGLET_LAMBDA(int tile) {
+          for_each_cell(g, tile, [&](std::int64_t node, std::int32_t i) {
+            key[i] = g.tile_key[tile] << 6 | static_cast<std::uint64_t>(node % kTileCells);
+            const CellRow<T> row(g, node, i);
+            for (int d = 0; d < kDirections; ++d) {
+              const std::int64_t at = static_cast<std::int64_t>(d) * g.cells + i;
+              neighbour[at] = row.neighbour[d], face[at] = row.face[d];
+            }
+            open[i] = row.open;
+            right[i] = row.open > T(0)
+                           ? fma(rate, least_divergence(g.node + node * kNodeValues), -row.outflow)
+                           : T(0);
+          });
+        },
+        kTileChunk);
+    pressure_.prepare(backend_);
+  }
+
+  // Calls f(node, number) for the fluid cells of a tile.
+  template <class F>
+  RINGLET_FUNCTION static void for_each_cell(const GridData<T>& g, std::int32_t tile, const F& f) {
+    std::int32_t number = g.first_cell[tile];
+    for (int cell = 0; cell < kTileCells; ++cell)
+      if (g.fluid[tile] >> cell & 1) f(static_cast<std::int64_t>(tile) * kTileCells + cell, number++);
+  }
+
+  // ---- From nodes to strands
+
+  // Velocities that the pressure changes, and friction among neighbours.
+  void keep_volume(GridFigures& figures) {
+    if (data_.cells > 0) solve(figures);
+    press(T(1e30));
+    give(data_.step.pic, data_.step.state.velocity, T(1));
+  }
+
+  // Positions, where hair is too dense: displacement that leaves velocities alone adds no energy.
+  void move_apart(GridFigures& figures) {
+    T* right = pressure_.right.data();
+    const T* open = pressure_.open.data();
+    backend_.parallel_for(
+        "grid: over density", data_.tiles,
+        [=, g = data_] RINGLET_LAMBDA(int tile) {
+          for_each_cell(g, tile, [&](std::int64_t node, std::int32_t i) {
+            right[i] = open[i] > T(0) ? wanted_divergence(g.node + node * kNodeValues) : T(0);
+          });
+        },
+        kTileChunk);
+    solve(figures);
+    press(T(1));
+    give(T(0), data_.step.state.position, static_cast<T>(data_.step.axes.cell));
+    figures.moved = true;
+  }
+
+  void solve(GridFigures& figures) {
+    const PressureFigures told = pressure_.solve(backend_, data_.step.residual, data_.step.most_iterations);
+    figures.iterations += told.iterations;
+    figures.residual = told.residual > figures.residual ? told.residual : figures.residual;
+    figures.solves += told.iterations > 0 ? 1 : 0;
+  }
+
+  void press(T most) {
+    const double* pressure = pressure_.pressure.data();
+    backend_.parallel_for(
+        "grid: press", data_.tiles,
+        [=, g = data_] RINGLET_LAMBDA(int tile) {
+          for (int cell = 0; cell < kTileCells; ++cell)
+            press_node(g, pressure, most, static_cast<std::int64_t>(tile) * kTileCells + cell);
+        },
+        kTileChunk);
+  }
+
+  void give(T pic, T* to, T factor) {
+    backend_.parallel_for(
+        "grid: gather", data_.occupied, [g = data_, pic] RINGLET_LAMBDA(int t) { gather_tile(g, pic, t); },
+        kTileChunk);
+    backend_.parallel_for(
+        "grid: give back", data_.lanes,
+        [g = data_, to, factor] RINGLET_LAMBDA(int s) { give_back(g, to, factor, s); }, 256);
+  }
+
+ private:
+  static constexpr int kTileChunk = 16;
+  static constexpr int kMostSamples = 4096;  // of a segment
+
+  Backend backend_;
+  GridData<T> data_{};
+  std::int32_t samples_ = 0;
+  double most_rest_density_ = 1;
+  Pressure<Backend, T> pressure_;
+  Buffer<std::int32_t> first_particle_, first_sample_, first_piece_, near_, occupied_tile_, tile_piece_,
+      flag_, wall_, wall_tile_, first_cell_;
+  Buffer<unsigned char> ends_;
+  Buffer<T> rest_density_, particle_, given_back_, node_, lightness_, opening_;
+  Buffer<Piece> piece_;
+  Buffer<std::uint64_t> piece_key_, tile_key_, occupied_key_, around_key_, fluid_;
+  Buffer<std::uint32_t> piece_of_, around_;
+  Buffer<Fixed<T>> sums_;
+};
+
+}  // namespace RINGLET_ISA
+}  // namespace ringlet::kernels

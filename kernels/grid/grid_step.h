@@ -1,0 +1,142 @@
+// What the hair's grid is told, what it tells, and its memory as the kernels see it.
+//
+// Hair is a fluid of the lattice's cells in axes that move with the head (AMS paper 3.2; McAdams et al. 2009;
+// physics.md section 5). Lengths in those axes are in cells. Segments are sampled along their length, at
+// least once a cell. A sample carries hair length, by which density counts, and a share of the masses of its
+// two particles, by which momentum counts: particles have unit mass, and the samples' shares of one add up to
+// it.
+//
+//   density   lambda = sum of w(x) l        [cell edges of hair in a cell]: lambda strands cross it
+//   target    lambda_t = sum of w l lambda_0 / lambda, lambda_0 the greatest density that the sample had
+//   about it
+//             at rest, and no less than the mean one or kLeastStrands: hair at rest is nowhere over its
+//             target, and cells with hardly a strand are no continuum
+//   velocity  on the cells' faces, u_f = sum of w m u / m_f, relative to the moving axes
+//
+// with w the trilinear weights of a staggered lattice. A node holds the values of one cell and of the faces
+// below it on each axis.
+#pragma once
+#include "kernels/grid/lattice.h"
+#include "kernels/solid/solid_view.h"
+#include "kernels/strand/strand_batch.h"
+
+namespace ringlet::kernels {
+
+inline constexpr double kLeastStrands = 2;  // in a cell
+// A cell is fluid where its density is above this share of its target; elsewhere is air, of no pressure.
+inline constexpr double kFluidShare = 0.5;
+// A face weighs at least this share of the face across the cell: pressure must not act on nothing.
+inline constexpr double kLeastFaceShare = 0.02;
+// Density is corrected by moving hair apart where it is above its target by this share; the correction of one
+// step is at most this divergence.
+inline constexpr double kOverDense = 0.01, kMostCorrection = 0.5;
+
+// The grid's axes: world x = rotation g cell + origin for a place g [cells].
+struct GridAxes {
+  double rotation[9], origin[3];  // row-major, [m]
+  // Velocity of what moves with the axes: slope (x - origin) + velocity [1/s], [m/s].
+  double slope[9], velocity[3];
+  double cell;  // edge of a cell [m]
+};
+
+template <class T>
+struct GridStep {
+  StrandBatches<T> batches;
+  StrandState<T> state;
+  const double* root_points;  // [batches][3] [m]
+  GridAxes axes;
+  double interval;  // between runs of the grid [s]
+  double substep;   // that the solids move over [s]
+  T pic;            // share of PIC in what strands are given back
+  double residual;  // relative, of the pressure
+  std::int32_t most_iterations;
+  std::int32_t clamped;  // prescribed particles at each root
+  const SolidView* solids;
+  std::int32_t solid_count;
+};
+
+struct GridFigures {
+  double iterations = 0;  // of conjugate gradients
+  double residual = 0;    // relative, largest of the solves
+  double solves = 0;
+  double density = 0;  // largest over its target, before this step's correction
+  double cells = 0;    // fluid
+  bool moved = false;  // positions were corrected
+};
+
+inline namespace RINGLET_ISA {
+
+// Values of a node. Before the solve: density, its product with the target, then mass and momentum of each
+// axis's face; after `finish_node` density, target, then mass and velocity; for the way back mass's place is
+// taken by the change.
+inline constexpr int kNodeValues = 8;
+enum NodeValue { kDensity, kTarget, kFaceMass };  // kFaceMass + 2 axis, and velocity after each
+
+inline constexpr int kHaloEdge = kTileEdge + 2, kHaloNodes = kHaloEdge * kHaloEdge * kHaloEdge;
+
+// Sums on nodes are of integers, so that no order of strands shows in them.
+template <class T>
+struct FixedPoint;
+template <>
+struct FixedPoint<float> {
+  using Integer = std::int32_t;
+  static constexpr double kRange = 2147483648.0;
+};
+template <>
+struct FixedPoint<double> {
+  using Integer = std::int64_t;
+  static constexpr double kRange = 4503599627370496.0;  // what a double holds of integers
+};
+template <class T>
+using Fixed = typename FixedPoint<T>::Integer;
+
+// A segment's way through one tile.
+struct Piece {
+  std::int32_t segment;  // its first particle
+  std::int32_t first;    // sample of the segment
+};
+
+inline constexpr unsigned char kFirstOfStrand = 1, kLastOfStrand = 2;
+
+// The grid's memory. Particles are numbered strand after strand, in the batches' order.
+template <class T>
+struct GridData {
+  GridStep<T> step;
+  // Strands
+  std::int32_t lanes;                  // batches * kLanes
+  const std::int32_t* first_particle;  // [lanes + 1]
+  std::int32_t particles;
+  const unsigned char* ends;         // [particles] kFirstOfStrand, kLastOfStrand
+  const std::int32_t* first_sample;  // [particles + 1] of the segment that begins there
+  T* rest_density;                   // [samples] lambda_0
+  T* particle;  // [particles][8] place [cells], 0, velocity relative to the axes [m/s], 0
+  // Pieces, in the order of segments, and by tile
+  const std::int32_t* first_piece;  // [particles + 1]
+  Piece* piece;                     // [pieces + 1]
+  std::int32_t pieces;
+  std::uint64_t* piece_key;  // [pieces] its tile's; sorted once there are tiles
+  std::uint32_t* piece_of;   // [pieces] sorted by tile
+  T* given_back;             // [pieces][6] to the segment's first and second particle
+  // Tiles, sorted by key
+  std::int32_t low[3];  // tile coordinates of key 0
+  std::int32_t tiles;
+  const std::uint64_t* tile_key;      // [tiles]
+  std::int32_t* near;                 // [tiles][kAround] tiles about it, x fastest, -1: none
+  std::int32_t occupied;              // tiles with pieces
+  const std::int32_t* occupied_tile;  // [occupied] which of the tiles
+  const std::int32_t* tile_piece;     // [occupied + 1] first of its pieces
+  Fixed<T>* sums;                     // [tiles][kTileCells][kNodeValues]
+  T* node;                            // [tiles][kTileCells][kNodeValues]
+  T* lightness;                       // [tiles][kTileCells][3] 1 / mass of the faces, 0: none to move
+  T scale[kNodeValues];               // of the sums
+  // Walls
+  std::int32_t* wall;  // [tiles] where its walls are, -1: no solid near
+  T* opening;          // [walls][kTileCells][6] open share of each face, velocity of the solid there
+  // Fluid cells, sorted by key
+  std::uint64_t* fluid;      // [tiles] a bit for each fluid cell
+  std::int32_t* first_cell;  // [tiles + 1]
+  std::int32_t cells;
+};
+
+}  // namespace RINGLET_ISA
+}  // namespace ringlet::kernels

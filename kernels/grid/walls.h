@@ -1,0 +1,116 @@
+// Solid walls in the grid: what share of each face lies outside the solids, and how fast the wall moves there
+// (Batty et al. 2007). Only tiles near a solid have any.
+#pragma once
+#include "kernels/grid/transfer.h"
+#include "kernels/solid/surface.h"
+
+namespace ringlet::kernels {
+inline namespace RINGLET_ISA {
+
+inline constexpr int kWallValues = 6;  // of a node: open share of its three faces, the wall's velocity there
+
+// A place of the grid in a solid's level-set axes [m].
+template <class T>
+RINGLET_FUNCTION Vector3<T> in_solid(const GridAxes& axes, const SolidView& solid, const double* place) {
+  double away[3];
+  for (int c = 0; c < 3; ++c) {
+    const double* r = axes.rotation + 3 * c;
+    away[c] = axes.cell * (r[0] * place[0] + r[1] * place[1] + r[2] * place[2]) +
+              (axes.origin[c] - solid.translation[c]);
+  }
+  return rotate_into<T>(solid.rotation, away);
+}
+
+// Whether a tile may have faces that are not wholly open.
+template <class T>
+RINGLET_FUNCTION bool near_wall(const GridData<T>& g, std::int32_t tile) {
+  // From the middle of 2 x 2 x 2 cells to the farthest of their faces, and half a cell for what is in part
+  // open.
+  const T reach = static_cast<T>(2.25 * g.step.axes.cell);
+  std::int32_t at[3];
+  tile_coordinates(g, tile, at);
+  for (std::int32_t s = 0; s < g.step.solid_count; ++s) {
+    const SolidView& solid = g.step.solids[s];
+    const T offset = static_cast<T>(solid.offset);
+    for (int part = 0; part < 8; ++part) {
+      double middle[3];
+      for (int c = 0; c < 3; ++c) middle[c] = kTileEdge * at[c] + 1 + 2 * (part >> c & 1);
+      const Vector3<T> p = in_solid<T>(g.step.axes, solid, middle);
+      if (BlendedSample<T>(solid, p).distance - offset < reach) return true;
+      // A band narrower than the reach does not tell.
+      if (static_cast<T>(solid.level_set[0].background) - offset < reach &&
+          distance_to_bounds(solid.level_set[0], p) < reach)
+        return true;
+    }
+  }
+  return false;
+}
+
+// The velocity of a solid at a place near its surface, relative to the grid's axes, along one of them [m/s].
+template <class T>
+RINGLET_FUNCTION T wall_velocity(const GridData<T>& g, const SolidView& solid, const double* place,
+                                 Vector3<T> p, std::int32_t triangle, int axis) {
+  const GridAxes& axes = g.step.axes;
+  double turn[9], away[3];
+  for (int k = 0; k < 9; ++k) turn[k] = solid.rotation[k] - solid.rotation_before[k];
+  Vector3<T> moved = rotate(turn, p);  // over the substep
+  if (triangle >= 0 && solid.vertices != solid.vertices_before) {
+    const T third = static_cast<T>(1.0 / 3);
+    moved =
+        moved + rotate(solid.rotation, local_displacement(solid, triangle, Vector3<T>{third, third, third}));
+  }
+  const T in_world[3] = {moved.x, moved.y, moved.z};
+  T along = T(0);
+  for (int c = 0; c < 3; ++c) {
+    const double* r = axes.rotation + 3 * c;
+    away[c] = axes.cell * (r[0] * place[0] + r[1] * place[1] + r[2] * place[2]);
+  }
+  for (int c = 0; c < 3; ++c) {
+    const double* slope = axes.slope + 3 * c;
+    const double carried = axes.velocity[c] + slope[0] * away[0] + slope[1] * away[1] + slope[2] * away[2];
+    const double own =
+        (static_cast<double>(in_world[c]) + solid.translation[c] - solid.translation_before[c]) /
+        g.step.substep;
+    along += static_cast<T>(axes.rotation[3 * c + axis] * (own - carried));
+  }
+  return along;
+}
+
+template <class T>
+RINGLET_FUNCTION void find_openings(const GridData<T>& g, std::int32_t tile, int cell) {
+  std::int32_t at[3];
+  tile_coordinates(g, tile, at);
+  T* to = g.opening + (static_cast<std::int64_t>(g.wall[tile]) * kTileCells + cell) * kWallValues;
+  for (int axis = 0; axis < 3; ++axis) {
+    double place[3];
+    for (int c = 0; c < 3; ++c)
+      place[c] = kTileEdge * at[c] + coordinate_in_tile(cell, c) + (c == axis ? 0.0 : 0.5);
+    T open = T(1), velocity = T(0);
+    for (std::int32_t s = 0; s < g.step.solid_count; ++s) {
+      const SolidView& solid = g.step.solids[s];
+      const Vector3<T> p = in_solid<T>(g.step.axes, solid, place);
+      const BlendedSample<T> level(solid, p);
+      const T distance = (level.distance - static_cast<T>(solid.offset)) / static_cast<T>(g.step.axes.cell);
+      const T outside = min(max(distance + T(0.5), T(0)), T(1));
+      if (!(outside < open)) continue;
+      open = outside;
+      velocity = wall_velocity(g, solid, place, p, level.first.triangle, axis);
+    }
+    to[axis] = open, to[3 + axis] = velocity;
+  }
+}
+
+template <class T>
+struct Opening {
+  T share, velocity;
+};
+template <class T>
+RINGLET_FUNCTION Opening<T> opening_of(const GridData<T>& g, std::int64_t node, int axis) {
+  const std::int32_t wall = g.wall[node / kTileCells];
+  if (wall < 0) return {T(1), T(0)};
+  const T* at = g.opening + (static_cast<std::int64_t>(wall) * kTileCells + node % kTileCells) * kWallValues;
+  return {at[axis], at[3 + axis]};
+}
+
+}  // namespace RINGLET_ISA
+}  // namespace ringlet::kernels

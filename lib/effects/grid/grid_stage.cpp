@@ -1,0 +1,126 @@
+#include "effects/grid/grid_stage.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "effects/grid/moving_axes.h"
+#include "effects/lengths.h"
+#include "kernels/launch/hair_grid.h"
+
+namespace ringlet::effects {
+namespace {
+
+void run_chunks(void*, int chunks, void (*body)(const void* context, int chunk), const void* context) {
+  tbb::parallel_for(0, chunks, [=](int chunk) { body(context, chunk); });
+}
+
+// The grid works on the host's state with the CPU's kernels, wherever the strands are stepped.
+template <class T>
+class GridStage : public Stage<T> {
+ public:
+  GridStage(const scene::Scene& scene, std::vector<solids::Solid>& solids, const state::StrandModel<T>& model,
+            state::StrandState<T>& state, Executor<T>& executor)
+      : scene_(scene),
+        options_(*scene.effects.hair_hair->grid),
+        solids_(solids),
+        model_(model),
+        state_(state),
+        views_(solids.size()),
+        lengths_(scene, model, state),
+        grid_(kernels::make_hair_grid<T>(kernels::instruction_set_named(executor.instruction_set().c_str()),
+                                         {run_chunks, nullptr})) {}
+
+  std::string name() const override { return "grid"; }
+  std::size_t bytes() const override {
+    return grid_->bytes() + lengths_.bytes() + views_.size() * sizeof(kernels::SolidView);
+  }
+  // Of the device, which only holds the lengths.
+  std::int64_t launches() const override { return each_substep() ? scene_.model.substeps : 1; }
+  std::int64_t diverged_strand() const override { return diverged_; }
+
+  void at_rest(Executor<T>&, const state::StrandState<T>& rest) override {
+    const double side = longest_side(model_, rest, moving_axes(model_, rest, 1, 1));
+    cell_ = side > 0 ? side / options_.resolution : 1;
+    kernels::GridStep<T> step = step_of(scene_.model.substeps / scene_.frames.fps);
+    step.axes = moving_axes(model_, rest, cell_, step.substep);
+    state::StrandState<T>& posed = const_cast<state::StrandState<T>&>(rest);
+    step.state = posed.view();
+    step.root_points = rest.root_points.data();
+    grid_->at_rest(step);
+  }
+
+  void run(Executor<T>& executor, const Substep& substep, FrameReport& report) override {
+    diverged_ = -1;
+    if (!substep.last_of_frame && !each_substep()) return;
+    executor.fetch(state_);
+    for (std::size_t k = 0; k < solids_.size(); ++k)
+      views_[k] = solids_[k].at(substep.time_before, substep.time);
+    kernels::GridStep<T> step = step_of(substep.step);
+    step.axes = moving_axes(model_, state_, cell_, substep.step);
+    const kernels::GridFigures figures = grid_->run(step);
+    executor.submit(state_);
+    if (figures.moved) {
+      lengths_.hold(executor, substep, step.interval, report);
+      diverged_ = lengths_.diverged_strand();
+    }
+    gather(figures, report);
+  }
+
+ private:
+  bool each_substep() const { return options_.cadence == scene::Cadence::kSubstep; }
+
+  kernels::GridStep<T> step_of(double substep) {
+    kernels::GridStep<T> step{};
+    step.batches = model_.view();
+    step.state = state_.view();
+    step.root_points = state_.root_points.data();
+    const int runs = each_substep() ? scene_.model.substeps : 1;  // a frame
+    step.interval = substep * scene_.model.substeps / runs;
+    step.substep = substep;
+    step.pic = static_cast<T>(1 - std::pow(1 - options_.pic, 1.0 / runs));
+    step.residual = options_.residual;
+    step.most_iterations = options_.max_iterations;
+    step.clamped = scene_.model.clamped_particles;
+    step.solids = views_.data();
+    step.solid_count = static_cast<std::int32_t>(views_.size());
+    return step;
+  }
+
+  void gather(const kernels::GridFigures& figures, FrameReport& report) const {
+    report.grid_solves += figures.solves, report.grid_iterations += figures.iterations;
+    report.grid_residual = std::max(report.grid_residual, figures.residual);
+    report.grid_density = figures.density;
+    report.grid_cells = std::max(report.grid_cells, figures.cells);
+  }
+
+  const scene::Scene& scene_;
+  const scene::HairGrid& options_;
+  std::vector<solids::Solid>& solids_;
+  const state::StrandModel<T>& model_;
+  state::StrandState<T>& state_;
+  std::vector<kernels::SolidView> views_;
+  Lengths<T> lengths_;
+  std::unique_ptr<kernels::HairGrid<T>> grid_;
+  double cell_ = 1;  // [m]
+  std::int64_t diverged_ = -1;
+};
+
+}  // namespace
+
+template <class T>
+std::unique_ptr<Stage<T>> make_grid_stage(const scene::Scene& scene, std::vector<solids::Solid>& solids,
+                                          const state::StrandModel<T>& model, state::StrandState<T>& state,
+                                          Executor<T>& executor) {
+  return std::make_unique<GridStage<T>>(scene, solids, model, state, executor);
+}
+
+template std::unique_ptr<Stage<float>> make_grid_stage(const scene::Scene&, std::vector<solids::Solid>&,
+                                                       const state::StrandModel<float>&,
+                                                       state::StrandState<float>&, Executor<float>&);
+template std::unique_ptr<Stage<double>> make_grid_stage(const scene::Scene&, std::vector<solids::Solid>&,
+                                                        const state::StrandModel<double>&,
+                                                        state::StrandState<double>&, Executor<double>&);
+
+}  // namespace ringlet::effects

@@ -1,8 +1,8 @@
 // Passes over the pairs: each finds the contacts as places are now, weighs and applies their impulses.
 //
-// A particle is moved by the sum of its contacts' impulses, which are rounded so that this sum is exact: it
-// does not depend on the order of pairs, on threads, or on the order of strands. What one contact gives to a
-// particle of one segment it takes from the other's.
+// Impulses on a particle are summed exactly, once rounded: the sum does not depend on the order of pairs, on
+// threads, or on the order of strands. What one contact gives to a particle of one segment it takes from the
+// other's.
 #pragma once
 #include "kernels/contact/contact_response.h"
 
@@ -90,7 +90,7 @@ struct WeighContacts {
   using T = Scalar<R>;
   static constexpr int kWidth = Traits<R>::kWidth;
   ContactPairs<T> pairs;
-  const Place<T>* velocity;  // extra: the particle's freedom, times the contacts that it is shared among
+  const Place<T>* velocity;  // extra: the particle's response to all contacts of its strand
   T friction;
 
   RINGLET_FUNCTION void operator()(std::int32_t pack) const {
@@ -129,61 +129,6 @@ struct WeighContacts {
 struct ContactLists {
   const std::int32_t* first;
   const std::int32_t* entry;
-};
-
-// Moves the particles of a strand.
-template <class T>
-struct ApplyContacts {
-  ContactPairs<T> pairs;
-  ContactLists lists;
-  const Place<T>* start;  // extra: freedom
-  Place<T>*end, *velocity;
-  const std::int32_t* row;  // [batches + 1]
-  const T* count;           // [batches][kLanes]
-
-  RINGLET_FUNCTION void operator()(std::int32_t strand) const {
-    const std::int32_t batch = strand / kLanes, particles = static_cast<std::int32_t>(count[strand]);
-    std::int32_t particle = row[batch] * kLanes + strand % kLanes;
-    Sum here{};
-    for (std::int32_t i = 0; i < particles; ++i, particle += kLanes) {
-      Sum next{};
-      if (i + 1 < particles && pairs.contacts[particle] > 0) add(particle, here, next);
-      if (here.any && start[particle].extra > T(0)) {
-        move(end[particle], here.place), move(velocity[particle], here.velocity);
-      }
-      here = next;
-    }
-  }
-
- private:
-  struct Sum {
-    double place[3], velocity[3];
-    bool any;
-  };
-
-  RINGLET_KERNEL void add(std::int32_t segment, Sum& begin, Sum& finish) const {
-    begin.any = finish.any = true;
-    for (std::int32_t k = lists.first[segment]; k < lists.first[segment + 1]; ++k) {
-      const std::int32_t entry = lists.entry[k], pair = entry >> 1;
-      if (!pairs.active[pair]) continue;
-      const ContactRecord<T>& record = pairs.record[pair];
-      const bool second = entry & 1;
-      const double share = second ? record.u : record.s, sign = second ? -1 : 1;
-      for (int c = 0; c < 3; ++c) {
-        split(sign * record.normal[c], share, begin.place[c], finish.place[c]);
-        split(sign * record.slip[c], share, begin.velocity[c], finish.velocity[c]);
-      }
-    }
-  }
-  // Both parts together are what the other segment has, but for the sign.
-  RINGLET_KERNEL static void split(double impulse, double share, double& begin, double& finish) {
-    const double part = summable(share * impulse);
-    finish += part, begin += summable(impulse) - part;
-  }
-  RINGLET_KERNEL static void move(Place<T>& place, const double* by) {
-    place.x = static_cast<T>(place.x + by[0]), place.y = static_cast<T>(place.y + by[1]),
-    place.z = static_cast<T>(place.z + by[2]);
-  }
 };
 
 }  // namespace RINGLET_ISA

@@ -6,12 +6,12 @@
 
 namespace ringlet::kernels {
 
-// What one application of the contacts found.
+// What the last pass found, before it answered.
 struct HairContactFigures {
-  std::int64_t pairs = 0;      // of segments that were near enough to be looked at in each pass
-  std::int64_t contacts = 0;   // pairs that touched or had crossed, in the first pass
-  std::int64_t crossings = 0;  // pairs that have crossed and are left so
-  double depth = 0;            // largest overlap left, without the pairs that are left crossed [m]
+  std::int64_t pairs = 0;      // of segments that passes look at
+  std::int64_t contacts = 0;   // those that touch or have crossed
+  std::int64_t crossings = 0;  // those that have crossed
+  double depth = 0;            // largest overlap of those that have not [m]
 };
 
 // One application, over all that moved since the last.
@@ -26,7 +26,6 @@ struct HairContactStep {
   const T* radius;                  // [rows] of the hair at each particle [m]
   std::int32_t clamped;             // prescribed particles at each root
   T friction;                       // Coulomb mu [-]
-  std::int32_t passes;
 };
 
 }  // namespace ringlet::kernels

@@ -5,8 +5,8 @@
 // among the pairs of neighbours and answers them (contact_response.h). Segments of one strand do not collide
 // with one another. Prescribed particles are not moved: segments at the root are obstacles.
 #pragma once
-#include "kernels/contact/contact_passes.h"
 #include "kernels/contact/neighbours.h"
+#include "kernels/contact/strand_response.h"
 
 namespace ringlet::kernels {
 inline namespace RINGLET_ISA {
@@ -21,29 +21,31 @@ class HairContacts {
   template <class Lent>
   explicit HairContacts(Lent lent) : backend_(lent) {}
 
-  HairContactFigures run(const HairContactStep<T>& step) {
+  // Finds the pairs that passes look at.
+  HairContactFigures begin(const HairContactStep<T>& step) {
     HairContactFigures figures;
+    pairs_.count = 0;
     if (!lay_out(step)) return figures;
     figures.pairs = neighbours_.find(backend_, places(), strand_.data(), particles_, reach_);
-    if (figures.pairs == 0) return figures;
-    list_pairs(static_cast<std::int32_t>(figures.pairs));
-    for (std::int32_t pass = 0; pass < step.passes; ++pass) {
-      const std::int64_t found = find();
-      if (pass == 0) figures.contacts = found;
-      if (found == 0) break;
-      answer(step);
-    }
-    if (figures.contacts == 0) return figures;
-    find();
-    count_left(figures);
-    write_back(step);
+    if (figures.pairs > 0) list_pairs(step, static_cast<std::int32_t>(figures.pairs));
     return figures;
+  }
+
+  // One pass, over the state as it now is.
+  void pass(const HairContactStep<T>& step, HairContactFigures& figures) {
+    if (pairs_.count == 0) return;
+    lay_out(step);
+    figures.contacts = find();
+    count_left(figures);
+    if (figures.contacts == 0) return;
+    answer(step);
+    write_back(step);
   }
 
   std::size_t bytes() const {
     return backend_.bytes() + start_.bytes() + end_.bytes() + velocity_.bytes() + strand_.bytes() +
            contacts_.bytes() + list_first_.bytes() + list_entry_.bytes() + cursor_.bytes() + record_.bytes() +
-           active_.bytes() + neighbours_.bytes();
+           active_.bytes() + load_.bytes() + kappa_.bytes() + neighbours_.bytes();
   }
 
  private:
@@ -121,7 +123,8 @@ class HairContacts {
   }
 
   // Which pairs each segment has.
-  void list_pairs(std::int32_t pairs) {
+  void list_pairs(const HairContactStep<T>& step, std::int32_t pairs) {
+    load_.resize(particles_), kappa_.resize(step.batches.batches * kLanes);
     record_.resize(pairs + kWidth), active_.resize(pairs + kWidth), contacts_.resize(particles_);
     list_first_.resize(particles_ + 1), cursor_.resize(particles_),
         list_entry_.resize(2 * static_cast<std::size_t>(pairs));
@@ -160,27 +163,16 @@ class HairContacts {
   }
 
   void answer(const HairContactStep<T>& step) {
-    const std::int32_t* contacts = contacts_.data();
-    const std::int32_t* strand = strand_.data();
-    const Place<T>* start = start_.data();
-    Place<T>*end = end_.data(), *velocity = velocity_.data();
-    backend_.parallel_for("share particles", particles_, [=] RINGLET_LAMBDA(std::int32_t p) {
-      std::int32_t shared = strand[p] < 0 ? 0 : contacts[p];
-      // The segment that ends here: rows of the batch before end in particles without one.
-      if (p >= kLanes && strand[p - kLanes] >= 0) shared += contacts[p - kLanes];
-      velocity[p].extra = start[p].extra * static_cast<T>(shared);
-    });
-    backend_.parallel_for("weigh contacts", packs(), WeighContacts<R>{pairs_, velocity, step.friction},
-                          kPackChunk);
-    backend_.parallel_for("apply contacts", step.batches.batches * kLanes,
-                          ApplyContacts<T>{pairs_,
-                                           {list_first_.data(), list_entry_.data()},
-                                           start,
-                                           end,
-                                           velocity,
-                                           step.batches.row,
-                                           step.batches.count},
-                          kStrandChunk);
+    const std::int32_t strands = step.batches.batches * kLanes;
+    const ContactStrands<T> work{pairs_,           {list_first_.data(), list_entry_.data()},
+                                 step.batches.row, step.batches.count,
+                                 start_.data(),    end_.data(),
+                                 velocity_.data(), load_.data(),
+                                 kappa_.data(),    step.clamped};
+    backend_.parallel_for("respond to contacts", strands, FindResponse<T>{work}, kStrandChunk);
+    backend_.parallel_for("weigh contacts", packs(),
+                          WeighContacts<R>{pairs_, velocity_.data(), step.friction}, kPackChunk);
+    backend_.parallel_for("apply contacts", strands, ApplyContacts<T>{work}, kStrandChunk);
   }
 
   void count_left(HairContactFigures& figures) {
@@ -231,6 +223,8 @@ class HairContacts {
   Buffer<std::int32_t> strand_, contacts_, list_first_, list_entry_, cursor_;
   Buffer<ContactRecord<T>> record_;
   Buffer<unsigned char> active_;
+  Buffer<ParticleLoad> load_;
+  Buffer<double> kappa_;
 };
 
 }  // namespace RINGLET_ISA

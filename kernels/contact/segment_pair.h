@@ -119,7 +119,7 @@ RINGLET_KERNEL R crossing_time(const SegmentPair<R>& pair) {
     const Mask<R> before = !differ_in_sign(value, c0);
     low = select(before, t, low), high = select(before, high, t);
     const R newton = t - value / select(abs(slope) > R(Scalar<R>(1e-36)), slope, R(Scalar<R>(1e-36)));
-    t = select((newton > low) & (newton < high), newton, half * (low + high));
+    t = select((low <= newton) & (newton <= high), newton, half * (low + high));
   }
   return t;
 }

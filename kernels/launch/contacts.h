@@ -17,7 +17,10 @@ struct HairContactTable {
   HairContactMemory* (*make)(HostThreads threads);
   void (*destroy)(HairContactMemory* memory);
   std::size_t (*bytes)(const HairContactMemory* memory);
-  HairContactFigures (*apply)(HairContactMemory* memory, const HairContactStep<T>& step);
+  // Finds what the passes look at; returns how many pairs that is.
+  HairContactFigures (*begin)(HairContactMemory* memory, const HairContactStep<T>& step);
+  // One pass over the state as it now is. The figures tell what it found.
+  void (*pass)(HairContactMemory* memory, const HairContactStep<T>& step, HairContactFigures& figures);
 };
 
 // The table for T = float or double.

@@ -19,10 +19,14 @@ struct Contacts {
   static std::size_t bytes(const HairContactMemory* memory) {
     return reinterpret_cast<const On*>(memory)->bytes();
   }
-  static HairContactFigures apply(HairContactMemory* memory, const HairContactStep<Scalar<R>>& step) {
-    return of(memory)->run(step);
+  static HairContactFigures begin(HairContactMemory* memory, const HairContactStep<Scalar<R>>& step) {
+    return of(memory)->begin(step);
   }
-  static constexpr HairContactTable<Scalar<R>> kTable = {make, destroy, bytes, apply};
+  static void pass(HairContactMemory* memory, const HairContactStep<Scalar<R>>& step,
+                   HairContactFigures& figures) {
+    of(memory)->pass(step, figures);
+  }
+  static constexpr HairContactTable<Scalar<R>> kTable = {make, destroy, bytes, begin, pass};
 };
 
 }  // namespace

@@ -10,16 +10,6 @@
 namespace ringlet::effects {
 namespace {
 
-using kernels::InstructionSet;
-
-// The executor's instruction set, or this processor's widest where the executor steps on a device: the
-// contacts are found on the CPU.
-InstructionSet instruction_set(const std::string& name) {
-  for (const InstructionSet set : {InstructionSet::kGeneric, InstructionSet::kAvx2, InstructionSet::kAvx512})
-    if (name == kernels::name_of(set)) return set;
-  return kernels::best_instruction_set();
-}
-
 void run_chunks(void*, int chunks, void (*body)(const void* context, int chunk), const void* context) {
   tbb::parallel_for(0, chunks, [=](int chunk) { body(context, chunk); });
 }
@@ -28,14 +18,17 @@ void run_chunks(void*, int chunks, void (*body)(const void* context, int chunk),
 template <class T>
 class Contacts {
  public:
-  explicit Contacts(InstructionSet set)
+  explicit Contacts(kernels::InstructionSet set)
       : table_(kernels::cpu_hair_contacts<T>(set)), memory_(table_.make({run_chunks, nullptr})) {}
   ~Contacts() { table_.destroy(memory_); }
   Contacts(const Contacts&) = delete;
   Contacts& operator=(const Contacts&) = delete;
 
-  kernels::HairContactFigures apply(const kernels::HairContactStep<T>& step) {
-    return table_.apply(memory_, step);
+  kernels::HairContactFigures begin(const kernels::HairContactStep<T>& step) {
+    return table_.begin(memory_, step);
+  }
+  void pass(const kernels::HairContactStep<T>& step, kernels::HairContactFigures& figures) {
+    table_.pass(memory_, step, figures);
   }
   std::size_t bytes() const { return table_.bytes(memory_); }
 
@@ -53,7 +46,7 @@ class ContactsStage : public Stage<T> {
         options_(*scene.effects.hair_hair->contacts),
         model_(model),
         state_(state),
-        contacts_(instruction_set(executor.instruction_set())),
+        contacts_(kernels::instruction_set_named(executor.instruction_set().c_str())),
         start_(state.position.size()),
         start_root_points_(state.root_points.size()),
         lengths_(scene, model, state) {}
@@ -66,7 +59,7 @@ class ContactsStage : public Stage<T> {
   // Of the device, which only holds the lengths.
   std::int64_t launches() const override {
     if (!scene_.effects.inextensible) return 0;
-    return kRounds * (each_substep() ? scene_.model.substeps : 1);
+    return static_cast<std::int64_t>(options_.passes) * (each_substep() ? scene_.model.substeps : 1);
   }
   std::int64_t diverged_strand() const override { return lengths_.diverged_strand(); }
 
@@ -81,21 +74,26 @@ class ContactsStage : public Stage<T> {
   void run(Executor<T>& executor, const Substep& substep, FrameReport& report) override {
     if (!substep.last_of_frame && !each_substep()) return;
     executor.fetch(state_);
-    for (int round = 0; round < kRounds; ++round) {
-      const kernels::HairContactFigures found = contacts_.apply(step());
-      gather(found, round, report);
+    const kernels::HairContactStep<T> step = contact_step();
+    kernels::HairContactFigures found = contacts_.begin(step);
+    report.contact_pairs += static_cast<double>(found.pairs);
+    const double seconds = substep.step * (each_substep() ? 1 : scene_.model.substeps);
+    for (int pass = 0; pass < options_.passes; ++pass) {
+      if (pass > 0) executor.fetch(state_);
+      contacts_.pass(step, found);
+      if (pass == 0) report.contacts += static_cast<double>(found.contacts);
+      if (found.contacts == 0) break;
       executor.submit(state_);
-      lengths_.hold(executor, substep, substep.step * (each_substep() ? 1 : scene_.model.substeps), report);
-      if (round + 1 < kRounds) executor.fetch(state_);
+      lengths_.hold(executor, substep, seconds, report);
     }
+    report.crossings += static_cast<double>(found.crossings);
+    report.contact_depth = std::max(report.contact_depth, found.depth);
   }
 
  private:
-  static constexpr int kRounds = 1;
-
   bool each_substep() const { return options_.cadence == scene::Cadence::kSubstep; }
 
-  kernels::HairContactStep<T> step() {
+  kernels::HairContactStep<T> contact_step() {
     kernels::HairContactStep<T> step{};
     step.batches = model_.view();
     step.row_count = static_cast<std::int32_t>(model_.layout.rows());
@@ -106,15 +104,7 @@ class ContactsStage : public Stage<T> {
     step.radius = model_.radius.data();
     step.clamped = scene_.model.clamped_particles;
     step.friction = static_cast<T>(options_.friction);
-    step.passes = options_.passes;
     return step;
-  }
-
-  void gather(const kernels::HairContactFigures& found, int, FrameReport& report) {
-    report.contact_pairs += static_cast<double>(found.pairs);
-    report.contacts += static_cast<double>(found.contacts);
-    report.crossings += static_cast<double>(found.crossings);
-    report.contact_depth = std::max(report.contact_depth, found.depth);
   }
 
   const scene::Scene& scene_;

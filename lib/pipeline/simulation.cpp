@@ -9,6 +9,8 @@
 
 #include "core/log.h"
 #include "core/timer.h"
+#include "effects/contacts/contacts_stage.h"
+#include "effects/grid/grid_stage.h"
 #include "effects/grooming/grooming.h"
 #include "effects/solids/contact_stage.h"
 #include "effects/strands/strand_stage.h"
@@ -162,10 +164,9 @@ class TypedSimulation : public Simulation {
 template <class T>
 void TypedSimulation<T>::add_hair_stages(const scene::HairHair& hair_hair) {
   if (hair_hair.grid)
-    throw Error(ErrorKind::kInput, "/effects/hair_hair/grid", "this program has no grid stage yet", "");
+    stages_.push_back(effects::make_grid_stage<T>(scene_, world_.solids, model_, state_, *executor_));
   if (hair_hair.contacts)
-    throw Error(ErrorKind::kInput, "/effects/hair_hair/contacts", "this program has no contacts stage yet",
-                "");
+    stages_.push_back(effects::make_contacts_stage<T>(scene_, model_, state_, *executor_));
 }
 
 template <class T>

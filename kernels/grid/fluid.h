@@ -36,6 +36,33 @@ RINGLET_FUNCTION std::int32_t fluid_cell(const GridData<T>& g, std::int64_t node
 }
 
 template <class T>
+RINGLET_FUNCTION void find_openings(const GridData<T>& g, std::int32_t tile, int cell) {
+  std::int32_t corner[3];
+  tile_corner(g, tile, corner);
+  T* to = g.opening + (static_cast<std::int64_t>(g.wall[tile]) * kTileCells + cell) * kWallValues;
+  const std::int64_t node = static_cast<std::int64_t>(tile) * kTileCells + cell;
+  const bool above = fluid_cell(g, node) >= 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!above && fluid_cell(g, next_node(g, node, axis, -1)) < 0) continue;
+    double place[3];
+    for (int c = 0; c < 3; ++c)
+      place[c] = kTileEdge * g.low[c] + corner[c] + coordinate_in_tile(cell, c) + (c == axis ? 0.0 : 0.5);
+    T open = T(1), velocity = T(0);
+    for (std::int32_t s = 0; s < g.step.solid_count; ++s) {
+      const SolidView& solid = g.step.solids[s];
+      const Vector3<T> p = in_solid<T>(g.step.axes, solid, place);
+      const BlendedSample<T> level(solid, p);
+      const T distance = (level.distance - static_cast<T>(solid.offset)) / static_cast<T>(g.step.axes.cell);
+      const T outside = min(max(distance + T(0.5), T(0)), T(1));
+      if (!(outside < open)) continue;
+      open = outside;
+      velocity = wall_velocity(g, solid, place, p, level.first.triangle, axis);
+    }
+    to[axis] = open, to[3 + axis] = velocity;
+  }
+}
+
+template <class T>
 RINGLET_FUNCTION std::uint64_t fluid_cells(const GridData<T>& g, std::int32_t tile) {
   std::uint64_t mask = 0;
   for (int cell = 0; cell < kTileCells; ++cell) {
@@ -44,6 +71,14 @@ RINGLET_FUNCTION std::uint64_t fluid_cells(const GridData<T>& g, std::int32_t ti
       mask |= std::uint64_t{1} << cell;
   }
   return mask;
+}
+
+// Whether a tile has faces of fluid cells: some of its own, or across its lower faces.
+template <class T>
+RINGLET_FUNCTION bool has_fluid_faces(const GridData<T>& g, std::int32_t tile) {
+  const std::int32_t* near = g.near + static_cast<std::int64_t>(tile) * kAround + kAround / 2;
+  const auto fluid = [&](std::int32_t other) { return other >= 0 && g.fluid[other] != 0; };
+  return fluid(tile) || fluid(near[-1]) || fluid(near[-3]) || fluid(near[-9]);
 }
 
 // 1 / mass of a node's faces, 0 where neither cell beside it is fluid.
@@ -118,19 +153,41 @@ RINGLET_FUNCTION T wanted_divergence(const T* values) {
   return min(wanted, static_cast<T>(kMostCorrection));
 }
 
-// The change that pressure makes to a node's faces takes the place of their masses.
+// The change that pressure makes to one of a node's faces.
 template <class T>
-RINGLET_FUNCTION void press_node(const GridData<T>& g, const double* pressure, T most, std::int64_t node) {
-  const std::int32_t cell = fluid_cell(g, node);
-  const double above = cell < 0 ? 0 : pressure[cell];
-  for (int axis = 0; axis < 3; ++axis) {
-    T change = T(0);
-    const T lightness = g.lightness[node * 3 + axis];
-    if (lightness > T(0) && opening_of(g, node, axis).share > T(0)) {
-      const std::int32_t other = fluid_cell(g, next_node(g, node, axis, -1));
-      change = lightness * static_cast<T>((other < 0 ? 0 : pressure[other]) - above);
+RINGLET_FUNCTION T pressed(const GridData<T>& g, const double* pressure, std::int64_t node, int axis) {
+  const T lightness = g.lightness[node * 3 + axis];
+  if (!(lightness > T(0) && opening_of(g, node, axis).share > T(0))) return T(0);
+  const auto at = [&](std::int64_t n) {
+    const std::int32_t cell = fluid_cell(g, n);
+    return cell < 0 ? 0.0 : pressure[cell];
+  };
+  return lightness * static_cast<T>(at(next_node(g, node, axis, -1)) - at(node));
+}
+
+// Readies a tile's nodes for the way back: the change of velocity and the share `pic` of the velocity itself
+// take the place of masses, no displacement that of velocities.
+template <class T>
+RINGLET_FUNCTION void press_velocities(const GridData<T>& g, const double* pressure, std::int32_t tile) {
+  const bool fluid = has_fluid_faces(g, tile);
+  for (int cell = 0; cell < kTileCells; ++cell) {
+    const std::int64_t node = static_cast<std::int64_t>(tile) * kTileCells + cell;
+    T* values = g.node + node * kNodeValues + kFaceMass;
+    for (int axis = 0; axis < 3; ++axis) {
+      const T change = fluid ? pressed(g, pressure, node, axis) : T(0);
+      values[2 * axis] = fma(g.step.pic, values[2 * axis + 1], change), values[2 * axis + 1] = T(0);
     }
-    g.node[node * kNodeValues + kFaceMass + 2 * axis] = min(max(change, -most), most);
+  }
+}
+// The displacement of each face [cells].
+template <class T>
+RINGLET_FUNCTION void press_places(const GridData<T>& g, const double* pressure, std::int32_t tile) {
+  if (!has_fluid_faces(g, tile)) return;
+  for (int cell = 0; cell < kTileCells; ++cell) {
+    const std::int64_t node = static_cast<std::int64_t>(tile) * kTileCells + cell;
+    for (int axis = 0; axis < 3; ++axis)
+      g.node[node * kNodeValues + kFaceMass + 2 * axis + 1] =
+          min(max(pressed(g, pressure, node, axis), T(-1)), T(1));
   }
 }
 

@@ -41,24 +41,25 @@ class GridSolver final : public HairGrid<T> {
     data_.step = step;
     if (data_.particles == 0) return figures;
     fill();
-    find_walls();
     find_fluid();
+    find_walls();
     figures.cells = data_.cells;
     figures.density = densest();
     if (data_.cells > 0) assemble();
     keep_volume(figures);
     if (figures.density > 1 + kOverDense) move_apart(figures);
+    give_back_all(figures.moved);
     return figures;
   }
 
   std::size_t bytes() const override {
     return backend_.bytes() + pressure_.bytes() + first_particle_.bytes() + ends_.bytes() +
            first_sample_.bytes() + rest_density_.bytes() + particle_.bytes() + first_piece_.bytes() +
-           piece_.bytes() + piece_key_.bytes() + piece_of_.bytes() + given_back_.bytes() + tile_key_.bytes() +
-           near_.bytes() + occupied_key_.bytes() + occupied_tile_.bytes() + tile_piece_.bytes() +
-           flag_.bytes() + around_key_.bytes() + around_.bytes() + sums_.bytes() + node_.bytes() +
-           lightness_.bytes() + wall_.bytes() + opening_.bytes() + wall_tile_.bytes() + fluid_.bytes() +
-           first_cell_.bytes();
+           tile_pieces_.bytes() + piece_.bytes() + piece_key_.bytes() + piece_of_.bytes() +
+           given_back_.bytes() + tile_key_.bytes() + near_.bytes() + occupied_key_.bytes() +
+           occupied_tile_.bytes() + tile_piece_.bytes() + flag_.bytes() + around_key_.bytes() +
+           around_.bytes() + sums_.bytes() + node_.bytes() + lightness_.bytes() + wall_.bytes() +
+           opening_.bytes() + wall_tile_.bytes() + fluid_.bytes() + first_cell_.bytes();
   }
 
   // ---- The strands' numbers
@@ -115,6 +116,8 @@ class GridSolver final : public HairGrid<T> {
     backend_.parallel_for(
         "grid: place", data_.lanes, [g = data_] RINGLET_LAMBDA(int s) { place_strand(g, s); }, 256);
     const int bits = find_bounds();
+    backend_.parallel_for("grid: shift", data_.particles,
+                          [g = data_] RINGLET_LAMBDA(int i) { shift_particle(g, i); });
     cut_pieces(bits);
     find_tiles(bits);
     scatter();
@@ -130,7 +133,7 @@ class GridSolver final : public HairGrid<T> {
         return static_cast<std::int32_t>(
             backend_.largest("grid: bounds", g.particles, -kFarCells, [=] RINGLET_LAMBDA(int i) {
               return static_cast<double>(sign) *
-                     tile_coordinate(cell_coordinate(particle[static_cast<std::int64_t>(i) * 8 + c]));
+                     (floor_to_int(particle[static_cast<std::int64_t>(i) * 8 + c]) >> 2);
             }));
       };
       data_.low[c] = -bound(T(-1)) - 1;
@@ -143,26 +146,31 @@ class GridSolver final : public HairGrid<T> {
     std::int32_t* count = first_piece_.data();
     backend_.parallel_for("grid: count pieces", data_.particles, [g = data_, count] RINGLET_LAMBDA(int i) {
       std::int32_t pieces = 0;
-      for_each_piece(g, i, [&](std::int32_t, std::uint64_t) { ++pieces; });
+      for_each_piece(g, i, [&](std::int32_t, TilePlace) { ++pieces; });
       count[i] = pieces;
     });
     const std::int32_t particles = data_.particles;
     backend_.parallel_for("grid: count pieces", 1, [=] RINGLET_LAMBDA(int) { count[particles] = 0; });
     data_.pieces = backend_.scan("grid: count pieces", first_piece_, particles + 1);
     piece_.resize(data_.pieces + 1), piece_key_.resize(data_.pieces), piece_of_.resize(data_.pieces);
-    given_back_.resize(std::size_t{6} * data_.pieces);
+    given_back_.resize(std::size_t{2 * kNodeValues} * data_.pieces);
     data_.piece = piece_.data(), data_.given_back = given_back_.data();
     data_.piece_key = piece_key_.data(), data_.piece_of = piece_of_.data();
     backend_.parallel_for("grid: cut pieces", data_.particles, [g = data_] RINGLET_LAMBDA(int i) {
       std::int32_t piece = g.first_piece[i];
-      for_each_piece(g, i, [&](std::int32_t sample, std::uint64_t key) {
-        g.piece[piece] = {i, sample}, g.piece_key[piece] = key;
+      for_each_piece(g, i, [&](std::int32_t sample, TilePlace tile) {
+        g.piece[piece] = {i, sample}, g.piece_key[piece] = key_of(tile.x, tile.y, tile.z);
         g.piece_of[piece] = static_cast<std::uint32_t>(piece), ++piece;
       });
       if (i + 1 == g.particles) g.piece[g.pieces] = {-1, 0};
     });
     backend_.sort("grid: sort pieces", piece_key_, piece_of_, data_.pieces, bits);
     data_.piece_key = piece_key_.data(), data_.piece_of = piece_of_.data();
+    tile_pieces_.resize(data_.pieces);
+    data_.tile_pieces = tile_pieces_.data();
+    backend_.parallel_for("grid: sort pieces", data_.pieces, [g = data_] RINGLET_LAMBDA(int q) {
+      g.tile_pieces[q] = tile_piece(g, static_cast<std::int32_t>(g.piece_of[q]));
+    });
   }
 
   // The tiles that pieces lie in, those about them, and where each tile's neighbours are.
@@ -226,6 +234,9 @@ class GridSolver final : public HairGrid<T> {
     backend_.parallel_for(
         "grid: neighbours", data_.tiles, [g = data_] RINGLET_LAMBDA(int tile) { find_near(g, tile); },
         kTileChunk);
+    backend_.parallel_for(
+        "grid: neighbours", data_.occupied, [g = data_] RINGLET_LAMBDA(int t) { find_around(g, t); },
+        kTileChunk);
   }
 
   void scatter() {
@@ -262,15 +273,14 @@ class GridSolver final : public HairGrid<T> {
     const double samples =
         backend_.largest("grid: samples", data_.occupied, 1, [g = data_] RINGLET_LAMBDA(int t) {
           double count = 0;
-          for_each_piece_of_tile(g, t, [&](std::uint32_t, const Segment<T>&, Piece piece, std::int32_t end) {
-            count += end - piece.first;
-          });
+          for (std::int32_t q = g.tile_piece[t]; q < g.tile_piece[t + 1]; ++q)
+            count += g.tile_pieces[q].end - g.tile_pieces[q].first;
           return count;
         });
     const T* particle = data_.particle;
     const double speed = backend_.largest("grid: speed", data_.particles, 1e-30, [=] RINGLET_LAMBDA(int i) {
-      const T* u = particle + static_cast<std::int64_t>(i) * 8 + 4;
-      return static_cast<double>(max(abs(u[0]), max(abs(u[1]), abs(u[2]))));
+      const T* u = particle + static_cast<std::int64_t>(i) * 8 + 3;
+      return static_cast<double>(max(abs(u[0]), max(abs(u[2]), abs(u[4]))));
     });
     constexpr int kMostWeight = kMostSampleLength > kMostSampleMass ? kMostSampleLength : kMostSampleMass;
     const double unit = 0.9 * FixedPoint<T>::kRange / (8.0 * kMostWeight * samples);
@@ -298,7 +308,9 @@ class GridSolver final : public HairGrid<T> {
     data_.wall = wall;
     backend_.parallel_for(
         "grid: near walls", data_.tiles + 1,
-        [g = data_] RINGLET_LAMBDA(int tile) { g.wall[tile] = tile < g.tiles && near_wall(g, tile) ? 1 : 0; },
+        [g = data_] RINGLET_LAMBDA(int tile) {
+          g.wall[tile] = tile < g.tiles && has_fluid_faces(g, tile) && near_wall(g, tile) ? 1 : 0;
+        },
         kTileChunk);
     const std::int32_t walls = backend_.scan("grid: near walls", wall_, data_.tiles + 1);
     wall_tile_.resize(walls), opening_.resize(static_cast<std::size_t>(walls) * kTileCells * kWallValues);
@@ -354,7 +366,8 @@ class GridSolver final : public HairGrid<T> {
     backend_.parallel_for(
         "grid: lightness", data_.tiles,
         [g = data_] RINGLET_LAMBDA(int tile) {
-          for (int cell = 0; cell < kTileCells; ++cell)
+          const bool fluid = has_fluid_faces(g, tile);
+          for (int cell = 0; fluid && cell < kTileCells; ++cell)
             find_lightness(g, static_cast<std::int64_t>(tile) * kTileCells + cell);
         },
         kTileChunk);
@@ -398,8 +411,10 @@ class GridSolver final : public HairGrid<T> {
   // Velocities that the pressure changes, and friction among neighbours.
   void keep_volume(GridFigures& figures) {
     if (data_.cells > 0) solve(figures);
-    press(T(1e30));
-    give(data_.step.pic, data_.step.state.velocity, T(1));
+    const double* pressure = pressure_.pressure.data();
+    backend_.parallel_for(
+        "grid: press", data_.tiles,
+        [g = data_, pressure] RINGLET_LAMBDA(int tile) { press_velocities(g, pressure, tile); }, kTileChunk);
   }
 
   // Positions, where hair is too dense: displacement that leaves velocities alone adds no energy.
@@ -415,8 +430,10 @@ class GridSolver final : public HairGrid<T> {
         },
         kTileChunk);
     solve(figures);
-    press(T(1));
-    give(T(0), data_.step.state.position, static_cast<T>(data_.step.axes.cell));
+    const double* pressure = pressure_.pressure.data();
+    backend_.parallel_for(
+        "grid: press", data_.tiles,
+        [g = data_, pressure] RINGLET_LAMBDA(int tile) { press_places(g, pressure, tile); }, kTileChunk);
     figures.moved = true;
   }
 
@@ -427,24 +444,13 @@ class GridSolver final : public HairGrid<T> {
     figures.solves += told.iterations > 0 ? 1 : 0;
   }
 
-  void press(T most) {
-    const double* pressure = pressure_.pressure.data();
+  void give_back_all(bool moved) {
     backend_.parallel_for(
-        "grid: press", data_.tiles,
-        [=, g = data_] RINGLET_LAMBDA(int tile) {
-          for (int cell = 0; cell < kTileCells; ++cell)
-            press_node(g, pressure, most, static_cast<std::int64_t>(tile) * kTileCells + cell);
-        },
-        kTileChunk);
-  }
-
-  void give(T pic, T* to, T factor) {
+        "grid: gather", data_.occupied, [g = data_] RINGLET_LAMBDA(int t) { gather_tile(g, t); }, kTileChunk);
+    const T cell = moved ? static_cast<T>(data_.step.axes.cell) : T(0);
     backend_.parallel_for(
-        "grid: gather", data_.occupied, [g = data_, pic] RINGLET_LAMBDA(int t) { gather_tile(g, pic, t); },
-        kTileChunk);
-    backend_.parallel_for(
-        "grid: give back", data_.lanes,
-        [g = data_, to, factor] RINGLET_LAMBDA(int s) { give_back(g, to, factor, s); }, 256);
+        "grid: give back", data_.lanes, [g = data_, cell] RINGLET_LAMBDA(int s) { give_back(g, cell, s); },
+        256);
   }
 
  private:
@@ -461,6 +467,7 @@ class GridSolver final : public HairGrid<T> {
   Buffer<unsigned char> ends_;
   Buffer<T> rest_density_, particle_, given_back_, node_, lightness_, opening_;
   Buffer<Piece> piece_;
+  Buffer<TilePiece> tile_pieces_;
   Buffer<std::uint64_t> piece_key_, tile_key_, occupied_key_, around_key_, fluid_;
   Buffer<std::uint32_t> piece_of_, around_;
   Buffer<Fixed<T>> sums_;

@@ -66,11 +66,11 @@ struct GridFigures {
 
 inline namespace RINGLET_ISA {
 
-// Values of a node. Before the solve: density, its product with the target, then mass and momentum of each
-// axis's face; after `finish_node` density, target, then mass and velocity; for the way back mass's place is
-// taken by the change.
+// Values of a node: density and its target, then mass and velocity of each axis's face. First they are sums,
+// of density, density times target, mass and momentum; last, for the way back, the changes of velocity and
+// place.
 inline constexpr int kNodeValues = 8;
-enum NodeValue { kDensity, kTarget, kFaceMass };  // kFaceMass + 2 axis, and velocity after each
+inline constexpr int kDensity = 0, kTarget = 1, kFaceMass = 2;  // + 2 axis; the velocity follows
 
 inline constexpr int kHaloEdge = kTileEdge + 2, kHaloNodes = kHaloEdge * kHaloEdge * kHaloEdge;
 
@@ -96,6 +96,15 @@ struct Piece {
   std::int32_t first;    // sample of the segment
 };
 
+// The same as a tile takes it, in the order of tiles: what is read one after the other lies so.
+struct TilePiece {
+  std::int32_t segment, number;  // its first particle; of the piece
+  std::int32_t first, end;       // samples
+  std::int32_t samples;          // of the whole segment
+  std::int32_t ends;             // kFirstOfStrand of its first particle, kLastOfStrand of its second
+  std::int32_t rest;             // its first sample among all
+};
+
 inline constexpr unsigned char kFirstOfStrand = 1, kLastOfStrand = 2;
 
 // The grid's memory. Particles are numbered strand after strand, in the batches' order.
@@ -109,12 +118,13 @@ struct GridData {
   const unsigned char* ends;         // [particles] kFirstOfStrand, kLastOfStrand
   const std::int32_t* first_sample;  // [particles + 1] of the segment that begins there
   T* rest_density;                   // [samples] lambda_0
-  T* particle;  // [particles][8] place [cells], 0, velocity relative to the axes [m/s], 0
+  T* particle;  // [particles][8] place [cells], then velocity relative to the axes [m/s] in 3, 5 and 7
   // Pieces, in the order of segments, and by tile
   const std::int32_t* first_piece;  // [particles + 1]
   Piece* piece;                     // [pieces + 1]
   std::int32_t pieces;
   std::uint64_t* piece_key;  // [pieces] its tile's; sorted once there are tiles
+  TilePiece* tile_pieces;    // [pieces] sorted by tile
   std::uint32_t* piece_of;   // [pieces] sorted by tile
   T* given_back;             // [pieces][6] to the segment's first and second particle
   // Tiles, sorted by key
@@ -128,7 +138,7 @@ struct GridData {
   Fixed<T>* sums;                     // [tiles][kTileCells][kNodeValues]
   T* node;                            // [tiles][kTileCells][kNodeValues]
   T* lightness;                       // [tiles][kTileCells][3] 1 / mass of the faces, 0: none to move
-  T scale[kNodeValues];               // of the sums
+  alignas(64) T scale[kNodeValues];   // of the sums
   // Walls
   std::int32_t* wall;  // [tiles] where its walls are, -1: no solid near
   T* opening;          // [walls][kTileCells][6] open share of each face, velocity of the solid there

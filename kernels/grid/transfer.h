@@ -1,11 +1,15 @@
 // Between strands and nodes: samples of segments, sums onto a tile and its halo, and the way back.
 #pragma once
+#include "kernels/backend/octet.h"
 #include "kernels/backend/vector.h"
 #include "kernels/grid/grid_step.h"
 #include "kernels/solid/level_set.h"
 
 namespace ringlet::kernels {
 inline namespace RINGLET_ISA {
+
+// Beyond this many cells from the origin there is no grid.
+inline constexpr int kFarCells = kTileEdge << (kTileAxisBits - 2);
 
 // ---- Strands in the grid's axes
 
@@ -17,7 +21,8 @@ RINGLET_FUNCTION Vector3<T> rotate_into(const double* rotation, const double* a)
   return {along(0), along(1), along(2)};
 }
 
-// Places and velocities of one lane's particles in the grid's axes.
+// Places and velocities of one lane's particles in the grid's axes, from their origin; `shift_particle` makes
+// it the lowest tile's corner.
 template <class T>
 RINGLET_FUNCTION void place_strand(const GridData<T>& g, int strand) {
   const StrandBatches<T>& batches = g.step.batches;
@@ -39,11 +44,20 @@ RINGLET_FUNCTION void place_strand(const GridData<T>& g, int strand) {
       u[c] = static_cast<double>(g.step.state.velocity[base + c * kLanes]) - carried[c] -
              (axes.slope[3 * c] * x[0] + axes.slope[3 * c + 1] * x[1] + axes.slope[3 * c + 2] * x[2]);
     const Vector3<T> place = per_cell * (at_root + rotate_into<T>(axes.rotation, x));
+    const T far = static_cast<T>(kFarCells);
+    // What is not a number lies at the far end too, and keeps conversions defined.
+    const auto bounded = [&](T a) { return min(max(-far, a), far); };
     const Vector3<T> velocity = rotate_into<T>(axes.rotation, u);
     T* to = g.particle + static_cast<std::int64_t>(first + i) * 8;
-    to[0] = place.x, to[1] = place.y, to[2] = place.z, to[3] = T(0);
-    to[4] = velocity.x, to[5] = velocity.y, to[6] = velocity.z, to[7] = T(0);
+    to[0] = bounded(place.x), to[1] = bounded(place.y), to[2] = bounded(place.z);
+    to[3] = velocity.x, to[4] = T(0), to[5] = velocity.y, to[6] = T(0), to[7] = velocity.z;
   }
+}
+
+template <class T>
+RINGLET_FUNCTION void shift_particle(const GridData<T>& g, int i) {
+  T* place = g.particle + static_cast<std::int64_t>(i) * 8;
+  for (int c = 0; c < 3; ++c) place[c] -= static_cast<T>(kTileEdge * g.low[c]);
 }
 
 // ---- Samples
@@ -53,127 +67,128 @@ inline constexpr int kMostSampleLength = 2, kMostSampleMass = 2;
 
 template <class T>
 struct Segment {
-  const T *a, *b;  // its particles in the grid's axes
+  Octet<T> a, b;  // its particles in the grid's axes
   std::int32_t samples;
+  T each;              // 1 / samples
   T share_a, share_b;  // of their masses, at full weight
-  T length;            // of hair at a sample [cells]
 
-  RINGLET_FUNCTION Segment(const GridData<T>& g, std::int32_t i)
-      : a(g.particle + static_cast<std::int64_t>(i) * 8),
-        b(a + 8),
-        samples(g.first_sample[i + 1] - g.first_sample[i]) {
-    const T each = T(1) / static_cast<T>(samples);
+  RINGLET_KERNEL Segment(const GridData<T>& g, std::int32_t particle, std::int32_t n, std::int32_t ends)
+      : a(Octet<T>::load(g.particle + static_cast<std::int64_t>(particle) * 8)),
+        b(Octet<T>::load(g.particle + static_cast<std::int64_t>(particle) * 8 + 8)),
+        samples(n),
+        each(T(1) / static_cast<T>(n)) {
     // Half a particle's mass is on each side of it, all of it at the strand's ends.
-    share_a = g.ends[i] & kFirstOfStrand ? T(2) * each : each;
-    share_b = g.ends[i + 1] & kLastOfStrand ? T(2) * each : each;
+    share_a = ends & kFirstOfStrand ? T(2) * each : each;
+    share_b = ends & kLastOfStrand ? T(2) * each : each;
+  }
+  // Of hair at a sample [cells]
+  RINGLET_FUNCTION T sample_length() const {
     T square = T(0);
-    for (int c = 0; c < 3; ++c) square = fma(b[c] - a[c], b[c] - a[c], square);
-    length = min(sqrt(square) * each, T(kMostSampleLength));
+    for (int c = 0; c < 3; ++c) square = fma(b.v[c] - a.v[c], b.v[c] - a.v[c], square);
+    return min(sqrt(square) * each, T(kMostSampleLength));
   }
-  RINGLET_FUNCTION T parameter(std::int32_t sample) const {
-    return (static_cast<T>(sample) + T(0.5)) / static_cast<T>(samples);
-  }
-  RINGLET_FUNCTION Vector3<T> place(T t) const {
-    return {fma(t, b[0] - a[0], a[0]), fma(t, b[1] - a[1], a[1]), fma(t, b[2] - a[2], a[2])};
-  }
+  RINGLET_FUNCTION T parameter(std::int32_t sample) const { return (static_cast<T>(sample) + T(0.5)) * each; }
+  RINGLET_FUNCTION Octet<T> place(T t) const { return a + Octet<T>(t) * (b - a); }
 };
 
-// Beyond this many tiles from the origin there is no grid [cells]; keeps keys and conversions defined, for
-// what is not a number too.
-inline constexpr int kFarCells = kTileEdge << (kTileAxisBits - 2);
+struct TilePlace {
+  std::uint32_t x, y, z;
+};
 template <class T>
-RINGLET_KERNEL std::int32_t cell_coordinate(T x) {
-  const T far = static_cast<T>(kFarCells);
-  return floor_to_int(min(max(x, -far), far));
-}
-RINGLET_KERNEL std::int32_t tile_coordinate(std::int32_t cell) { return cell >> 2; }
-
-template <class T>
-RINGLET_FUNCTION std::uint64_t tile_key_at(const GridData<T>& g, Vector3<T> x) {
-  const auto along = [&](T a, int c) {
-    return static_cast<std::uint32_t>(tile_coordinate(cell_coordinate(a)) - g.low[c]);
-  };
-  return key_of(along(x.x, 0), along(x.y, 1), along(x.z, 2));
+RINGLET_KERNEL TilePlace tile_at_place(const Octet<T>& p) {
+  const auto along = [](T a) { return static_cast<std::uint32_t>(static_cast<std::int32_t>(a)) >> 2; };
+  return {along(p.v[0]), along(p.v[1]), along(p.v[2])};
 }
 
-// Calls visit(sample, key) for the first sample in each tile on the segment's way.
+// Calls visit(sample, tile) for the first sample in each tile on the segment's way.
 template <class T, class Visit>
 RINGLET_FUNCTION void for_each_piece(const GridData<T>& g, std::int32_t i, const Visit& visit) {
   if (g.ends[i] & kLastOfStrand) return;
-  const Segment<T> segment(g, i);
-  std::uint64_t before = ~std::uint64_t{0};
+  const Segment<T> segment(g, i, g.first_sample[i + 1] - g.first_sample[i], 0);
+  TilePlace before{};
   for (std::int32_t s = 0; s < segment.samples; ++s) {
-    const std::uint64_t key = tile_key_at(g, segment.place(segment.parameter(s)));
-    if (key != before) visit(s, key);
-    before = key;
+    const TilePlace tile = tile_at_place(segment.place(segment.parameter(s)));
+    if (s == 0 || tile.x != before.x || tile.y != before.y || tile.z != before.z) visit(s, tile);
+    before = tile;
   }
 }
 
-// ---- Weights: along each axis, of the three cells about a place (the one it lies in is the middle one), for
+// ---- Weights: of the three cells about a place along each axis (the one it lies in is the middle one), for
 // values in the cells' middles and for those on their lower faces.
 
-template <class T>
-struct AxisWeights {
-  T middle[3], face[3];
+// The lanes of a node's values that lie on the lower face of an axis.
+template <int kAxis>
+inline constexpr int kFaceLanes = 3 << (kFaceMass + 2 * kAxis);
 
-  RINGLET_KERNEL explicit AxisWeights(T within) {  // the cell, 0 to 1
-    const T half = T(0.5);
-    middle[0] = max(half - within, T(0)), middle[2] = max(within - half, T(0));
-    middle[1] = T(1) - middle[0] - middle[2];
-    face[0] = T(0), face[1] = T(1) - within, face[2] = within;
-  }
-};
-
-// The weights of a sample at one row of three nodes (along x), for each of a node's values.
+// The weights of a sample at the 27 nodes about it, for each of a node's values: x[i] y[j] z[k].
 template <class T>
 struct SampleWeights {
-  AxisWeights<T> x, y, z;
+  Octet<T> x[3], y[3], z[3];
   int corner;  // the node below it on each axis, in the halo
 
-  RINGLET_KERNEL SampleWeights(T fx, T fy, T fz, int at) : x(fx), y(fy), z(fz), corner(at) {}
+  // `place` in cells; `low`: the tile's corner.
+  RINGLET_KERNEL SampleWeights(const std::int32_t* low, const Octet<T>& place) {
+    std::int32_t at[3];
+    Octet<T> within = place;
+    RINGLET_UNROLL
+    for (int c = 0; c < 3; ++c) {
+      at[c] = static_cast<std::int32_t>(place.v[c]);
+      within.v[c] = place.v[c] - static_cast<T>(at[c]);
+    }
+    corner = ((at[2] - low[2]) * kHaloEdge + (at[1] - low[1])) * kHaloEdge + (at[0] - low[0]);
+    const Octet<T> half(T(0.5)), one(T(1));
+    const Octet<T> before = positive(half - within), after = positive(within - half);
+    const Octet<T> middle = one - before - after, face = one - within;
+    const auto set = [&](auto axis, Octet<T>* w) {
+      constexpr int kAxis = decltype(axis)::kValue, kFace = kFaceLanes<kAxis>;
+      w[0] = choose<kFace>(Octet<T>(T(0)), Octet<T>(before.v[kAxis]));
+      w[1] = choose<kFace>(Octet<T>(face.v[kAxis]), Octet<T>(middle.v[kAxis]));
+      w[2] = choose<kFace>(Octet<T>(within.v[kAxis]), Octet<T>(after.v[kAxis]));
+    };
+    set(Axis<0>{}, x), set(Axis<1>{}, y), set(Axis<2>{}, z);
+  }
+  RINGLET_KERNEL int node(int j, int k) const { return corner + (k * kHaloEdge + j) * kHaloEdge; }
 
-  // Of the row's nodes in y and z, for density, then for the faces of x, y and z.
-  RINGLET_KERNEL void row(int j, int k, T* w) const {
-    const T middle = y.middle[j] * z.middle[k];
-    w[0] = w[1] = w[2] = w[3] = middle;
-    w[4] = w[5] = y.face[j] * z.middle[k];
-    w[6] = w[7] = y.middle[j] * z.face[k];
-  }
-  // And along x.
-  RINGLET_KERNEL void along(int i, T* w) const {
-    for (int v = 0; v < kNodeValues; ++v) w[v] = x.middle[i];
-    w[2] = w[3] = x.face[i];
-  }
+ private:
+  template <int kAxis>
+  struct Axis {
+    static constexpr int kValue = kAxis;
+  };
 };
 
-// The tiles about a tile.
+// The tiles across a tile's faces.
 template <class T>
 RINGLET_FUNCTION void find_near(const GridData<T>& g, std::int32_t tile) {
-  std::int32_t* near = g.near + static_cast<std::int64_t>(tile) * kAround;
-  for (int n = 0; n < kAround; ++n) {
-    std::uint64_t key = g.tile_key[tile];
-    int place = n;
-    for (int axis = 0; axis < 3; ++axis, place /= 3) {
-      if (place % 3 == 0) key = key_before(key, axis);
-      if (place % 3 == 2) key = key_after(key, axis);
-    }
-    near[n] = find_key(g.tile_key, g.tiles, key);
+  std::int32_t* near = g.near + static_cast<std::int64_t>(tile) * kAround + kAround / 2;
+  near[0] = tile;
+  for (int axis = 0, stride = 1; axis < 3; ++axis, stride *= 3) {
+    near[-stride] = find_key(g.tile_key, g.tiles, key_before(g.tile_key[tile], axis));
+    near[stride] = find_key(g.tile_key, g.tiles, key_after(g.tile_key[tile], axis));
   }
 }
 
-// Where a place lies in a tile's halo. `tile`: coordinates of the tile.
+// Those across an occupied tile's edges and corners: all are there, so that one leads to another.
 template <class T>
-RINGLET_KERNEL SampleWeights<T> weights_in_tile(const std::int32_t* tile, Vector3<T> p) {
-  const std::int32_t x = cell_coordinate(p.x), y = cell_coordinate(p.y), z = cell_coordinate(p.z);
-  const int i = x - kTileEdge * tile[0], j = y - kTileEdge * tile[1], k = z - kTileEdge * tile[2];
-  return {p.x - static_cast<T>(x), p.y - static_cast<T>(y), p.z - static_cast<T>(z),
-          (k * kHaloEdge + j) * kHaloEdge + i};
+RINGLET_FUNCTION void find_around(const GridData<T>& g, std::int32_t occupied) {
+  const std::int32_t own = g.occupied_tile[occupied];
+  const auto beside = [&](std::int32_t tile, int stride, int side) {
+    return g.near[static_cast<std::int64_t>(tile) * kAround + kAround / 2 + stride * (side - 1)];
+  };
+  for (int n = 0; n < kAround; ++n) {
+    const int x = n % 3, y = n / 3 % 3, z = n / 9;
+    if ((x != 1) + (y != 1) + (z != 1) < 2) continue;
+    std::int32_t tile = z == 1 ? own : beside(own, 9, z);
+    if (y != 1) tile = beside(tile, 3, y);
+    if (x != 1) tile = beside(tile, 1, x);
+    g.near[static_cast<std::int64_t>(own) * kAround + n] = tile;
+  }
 }
 
+// A tile's lowest corner, from the lowest tile's [cells].
 template <class T>
-RINGLET_FUNCTION void tile_coordinates(const GridData<T>& g, std::int32_t tile, std::int32_t* at) {
+RINGLET_FUNCTION void tile_corner(const GridData<T>& g, std::int32_t tile, std::int32_t* corner) {
   for (int c = 0; c < 3; ++c)
-    at[c] = static_cast<std::int32_t>(gather_bits(g.tile_key[tile] >> c)) + g.low[c];
+    corner[c] = kTileEdge * static_cast<std::int32_t>(gather_bits(g.tile_key[tile] >> c));
 }
 
 // Calls visit(node of the halo, node of the grid) for those that exist.
@@ -182,32 +197,66 @@ RINGLET_FUNCTION void for_each_halo_node(const GridData<T>& g, std::int32_t tile
   const std::int32_t* near = g.near + static_cast<std::int64_t>(tile) * kAround;
   const auto side = [](int a) { return a == 0 ? 0 : a <= kTileEdge ? 1 : 2; };
   for (int k = 0; k < kHaloEdge; ++k)
-    for (int j = 0; j < kHaloEdge; ++j)
+    for (int j = 0; j < kHaloEdge; ++j) {
+      const std::int32_t* row = near + (side(k) * 3 + side(j)) * 3;
+      const int cells = cell_in_tile(0, (j - 1) & 3, (k - 1) & 3), halo = (k * kHaloEdge + j) * kHaloEdge;
+      RINGLET_UNROLL
       for (int i = 0; i < kHaloEdge; ++i) {
-        const std::int32_t other = near[(side(k) * 3 + side(j)) * 3 + side(i)];
-        if (other < 0) continue;
-        const int cell = cell_in_tile((i - 1) & 3, (j - 1) & 3, (k - 1) & 3);
-        visit((k * kHaloEdge + j) * kHaloEdge + i, static_cast<std::int64_t>(other) * kTileCells + cell);
+        const std::int64_t other = row[side(i)];
+        if (other >= 0) visit(halo + i, other * kTileCells + (cells | cell_in_tile((i - 1) & 3, 0, 0)));
       }
+    }
 }
 
-// Calls visit(segment's number, segment, first sample, end) for the pieces of an occupied tile.
+// A piece as a tile takes it.
+template <class T>
+RINGLET_FUNCTION TilePiece tile_piece(const GridData<T>& g, std::int32_t number) {
+  const Piece piece = g.piece[number], next = g.piece[number + 1];
+  const std::int32_t rest = g.first_sample[piece.segment], samples = g.first_sample[piece.segment + 1] - rest;
+  return {piece.segment,
+          number,
+          piece.first,
+          next.segment == piece.segment ? next.first : samples,
+          samples,
+          (g.ends[piece.segment] & kFirstOfStrand) | (g.ends[piece.segment + 1] & kLastOfStrand),
+          rest + piece.first};
+}
+
+// Calls visit(piece, segment) for the pieces of an occupied tile.
 template <class T, class Visit>
 RINGLET_FUNCTION void for_each_piece_of_tile(const GridData<T>& g, std::int32_t occupied,
                                              const Visit& visit) {
   for (std::int32_t q = g.tile_piece[occupied]; q < g.tile_piece[occupied + 1]; ++q) {
-    const std::uint32_t number = g.piece_of[q];
-    const Piece piece = g.piece[number], next = g.piece[number + 1];
-    const Segment<T> segment(g, piece.segment);
-    visit(number, segment, piece, next.segment == piece.segment ? next.first : segment.samples);
+#if !defined(__CUDA_ARCH__)
+    constexpr int kAhead = 8;  // particles lie anywhere: they are on their way when their turn comes
+    if (q + kAhead < g.pieces) {
+      const TilePiece& later = g.tile_pieces[q + kAhead];
+      __builtin_prefetch(g.particle + static_cast<std::int64_t>(later.segment) * 8);
+      __builtin_prefetch(g.particle + static_cast<std::int64_t>(later.segment) * 8 + 15);
+      __builtin_prefetch(g.rest_density + later.rest);
+    }
+#endif
+    const TilePiece piece = g.tile_pieces[q];
+    visit(piece, Segment<T>(g, piece.segment, piece.samples, piece.ends));
   }
 }
 
 // ---- Onto the nodes
 
 template <class T>
-RINGLET_KERNEL Fixed<T> to_fixed(T a) {
-  return static_cast<Fixed<T>>(a + select(a < T(0), T(-0.5), T(0.5)));
+RINGLET_KERNEL void add_sample(const SampleWeights<T>& w, const Octet<T>& value, Fixed<T>* sums) {
+  RINGLET_UNROLL
+  for (int k = 0; k < 3; ++k) {
+    const Octet<T> plane = w.z[k] * value;
+    RINGLET_UNROLL
+    for (int j = 0; j < 3; ++j) {
+      const Octet<T> row = w.y[j] * plane;
+      Fixed<T>* to = sums + w.node(j, k) * kNodeValues;
+      RINGLET_UNROLL
+      for (int i = 0; i < 3; ++i, to += kNodeValues)
+        (Octet<Fixed<T>>::load(to) + nearest(row * w.x[i])).store(to);
+    }
+  }
 }
 
 // The sums of one occupied tile's samples, added to its nodes and those about it. Tiles that are added at the
@@ -215,43 +264,26 @@ RINGLET_KERNEL Fixed<T> to_fixed(T a) {
 template <class T>
 RINGLET_FUNCTION void scatter_tile(const GridData<T>& g, std::int32_t occupied) {
   const std::int32_t tile = g.occupied_tile[occupied];
-  std::int32_t at[3];
-  tile_coordinates(g, tile, at);
-  Fixed<T> sums[kHaloNodes * kNodeValues];
+  std::int32_t corner[3];
+  tile_corner(g, tile, corner);
+  const Octet<T> scale = Octet<T>::load(g.scale);
+  alignas(64) Fixed<T> sums[kHaloNodes * kNodeValues];
   for (int n = 0; n < kHaloNodes * kNodeValues; ++n) sums[n] = 0;
-  for_each_piece_of_tile(
-      g, occupied, [&](std::uint32_t, const Segment<T>& segment, Piece piece, std::int32_t end) {
-        const std::int32_t rest = g.first_sample[piece.segment];
-        for (std::int32_t s = piece.first; s < end; ++s) {
-          const T t = segment.parameter(s), a = (T(1) - t) * segment.share_a, b = t * segment.share_b;
-          const SampleWeights<T> weights = weights_in_tile(at, segment.place(t));
-          T value[kNodeValues] = {segment.length, segment.length * g.rest_density[rest + s]};
-          for (int c = 0; c < 3; ++c) {
-            value[kFaceMass + 2 * c] = a + b;
-            value[kFaceMass + 2 * c + 1] = fma(a, segment.a[4 + c], b * segment.b[4 + c]);
-          }
-          for (int v = 0; v < kNodeValues; ++v) value[v] *= g.scale[v];
-          add_sample(weights, value, sums);
-        }
-      });
-  for_each_halo_node(g, tile, [&](int halo, std::int64_t node) {
-    for (int v = 0; v < kNodeValues; ++v) g.sums[node * kNodeValues + v] += sums[halo * kNodeValues + v];
-  });
-}
-
-template <class T>
-RINGLET_KERNEL void add_sample(const SampleWeights<T>& weights, const T* value, Fixed<T>* sums) {
-  T along[3][kNodeValues];
-  for (int i = 0; i < 3; ++i) weights.along(i, along[i]);
-  for (int k = 0; k < 3; ++k)
-    for (int j = 0; j < 3; ++j) {
-      T row[kNodeValues];
-      weights.row(j, k, row);
-      for (int v = 0; v < kNodeValues; ++v) row[v] *= value[v];
-      Fixed<T>* to = sums + (weights.corner + (k * kHaloEdge + j) * kHaloEdge) * kNodeValues;
-      for (int i = 0; i < 3; ++i)
-        for (int v = 0; v < kNodeValues; ++v) to[i * kNodeValues + v] += to_fixed(row[v] * along[i][v]);
+  for_each_piece_of_tile(g, occupied, [&](const TilePiece& piece, const Segment<T>& segment) {
+    const T* rest = g.rest_density + (piece.rest - piece.first);
+    const T length = segment.sample_length();
+    for (std::int32_t s = piece.first; s < piece.end; ++s) {
+      const T t = segment.parameter(s), a = (T(1) - t) * segment.share_a, b = t * segment.share_b;
+      constexpr int kMomenta = 1 << 3 | 1 << 5 | 1 << 7;  // where a particle has its velocity
+      Octet<T> value = choose<kMomenta>(Octet<T>(a) * segment.a + Octet<T>(b) * segment.b, Octet<T>(a + b));
+      value.v[kDensity] = length, value.v[kTarget] = length * rest[s];
+      add_sample(SampleWeights<T>(corner, segment.place(t)), value * scale, sums);
     }
+  });
+  for_each_halo_node(g, tile, [&](int halo, std::int64_t node) {
+    Fixed<T>* to = g.sums + node * kNodeValues;
+    (Octet<Fixed<T>>::load(to) + Octet<Fixed<T>>::load(sums + halo * kNodeValues)).store(to);
+  });
 }
 
 // Density, target, masses and velocities of a node from its sums.
@@ -267,71 +299,80 @@ RINGLET_FUNCTION void finish_node(const GridData<T>& g, std::int64_t node) {
 
 // ---- Back to the strands
 
-// What a tile's samples read off the nodes, gathered to the ends of their segments: change + pic (velocity -
-// own), with own the sample's velocity. Each end takes it by the share of its mass that the sample has, so
-// that what nodes give away is what particles get.
 template <class T>
-RINGLET_FUNCTION void gather_tile(const GridData<T>& g, T pic, std::int32_t occupied) {
-  const std::int32_t tile = g.occupied_tile[occupied];
-  std::int32_t at[3];
-  tile_coordinates(g, tile, at);
-  T values[kHaloNodes * kNodeValues];
-  for (int n = 0; n < kHaloNodes * kNodeValues; ++n) values[n] = T(0);
-  for_each_halo_node(g, tile, [&](int halo, std::int64_t node) {
-    for (int v = 0; v < kNodeValues; ++v) values[halo * kNodeValues + v] = g.node[node * kNodeValues + v];
-  });
-  for_each_piece_of_tile(
-      g, occupied, [&](std::uint32_t number, const Segment<T>& segment, Piece piece, std::int32_t end) {
-        T given[6] = {};
-        for (std::int32_t s = piece.first; s < end; ++s) {
-          const T t = segment.parameter(s), a = (T(1) - t) * segment.share_a, b = t * segment.share_b;
-          T read[kNodeValues];
-          read_sample(weights_in_tile(at, segment.place(t)), values, read);
-          for (int c = 0; c < 3; ++c) {
-            const T own = fma(a, segment.a[4 + c], b * segment.b[4 + c]) / (a + b);
-            const T change = fma(pic, read[kFaceMass + 2 * c + 1] - own, read[kFaceMass + 2 * c]);
-            given[c] = fma(a, change, given[c]), given[3 + c] = fma(b, change, given[3 + c]);
-          }
-        }
-        for (int c = 0; c < 6; ++c) g.given_back[static_cast<std::int64_t>(number) * 6 + c] = given[c];
-      });
-}
-
-template <class T>
-RINGLET_KERNEL void read_sample(const SampleWeights<T>& weights, const T* values, T* read) {
-  T along[3][kNodeValues];
-  for (int i = 0; i < 3; ++i) weights.along(i, along[i]);
-  for (int v = 0; v < kNodeValues; ++v) read[v] = T(0);
-  for (int k = 0; k < 3; ++k)
+RINGLET_KERNEL Octet<T> read_sample(const SampleWeights<T>& w, const T* values) {
+  Octet<T> read(T(0));
+  RINGLET_UNROLL
+  for (int k = 0; k < 3; ++k) {
+    Octet<T> plane(T(0));
+    RINGLET_UNROLL
     for (int j = 0; j < 3; ++j) {
-      T row[kNodeValues];
-      weights.row(j, k, row);
-      const T* from = values + (weights.corner + (k * kHaloEdge + j) * kHaloEdge) * kNodeValues;
-      for (int i = 0; i < 3; ++i)
-        for (int v = 0; v < kNodeValues; ++v)
-          read[v] = fma(row[v] * along[i][v], from[i * kNodeValues + v], read[v]);
+      const T* from = values + w.node(j, k) * kNodeValues;
+      Octet<T> row = w.x[0] * Octet<T>::load(from);
+      row = row + w.x[1] * Octet<T>::load(from + kNodeValues);
+      row = row + w.x[2] * Octet<T>::load(from + 2 * kNodeValues);
+      plane = plane + w.y[j] * row;
     }
+    read = read + w.z[k] * plane;
+  }
+  return read;
 }
 
-// Adds `factor` times what the pieces were given to one strand's velocities, or to its positions.
+// What a tile's samples read off the nodes, gathered to the ends of their segments: of velocities change +
+// pic (velocity - own), own the sample's, and of places the displacement. Each end takes it by the share of
+// its mass that the sample has, so that what nodes give away is what particles get.
 template <class T>
-RINGLET_FUNCTION void give_back(const GridData<T>& g, T* to, T factor, int strand) {
+RINGLET_FUNCTION void gather_tile(const GridData<T>& g, std::int32_t occupied) {
+  const std::int32_t tile = g.occupied_tile[occupied];
+  std::int32_t corner[3];
+  tile_corner(g, tile, corner);
+  alignas(64) T values[kHaloNodes * kNodeValues];
+  for_each_halo_node(g, tile, [&](int halo, std::int64_t node) {
+    Octet<T>::load(g.node + node * kNodeValues).store(values + halo * kNodeValues);
+  });
+  for_each_piece_of_tile(g, occupied, [&](const TilePiece& piece, const Segment<T>& segment) {
+    // Of the first particle, then of the second; lanes as the nodes'.
+    Octet<T> given[2] = {Octet<T>(T(0)), Octet<T>(T(0))};
+    Octet<T> speed[2] = {Octet<T>(T(0)), Octet<T>(T(0))};
+    for (int v = kFaceMass; v < kNodeValues; v += 2) {
+      speed[0].v[v] = g.step.pic * segment.a.v[v + 1];
+      speed[1].v[v] = g.step.pic * segment.b.v[v + 1];
+    }
+    for (std::int32_t s = piece.first; s < piece.end; ++s) {
+      const T t = segment.parameter(s), a = (T(1) - t) * segment.share_a, b = t * segment.share_b;
+      const T own = T(1) / (a + b);
+      const Octet<T> read = read_sample(SampleWeights<T>(corner, segment.place(t)), values) -
+                            (Octet<T>(a * own) * speed[0] + Octet<T>(b * own) * speed[1]);
+      given[0] = given[0] + Octet<T>(a) * read, given[1] = given[1] + Octet<T>(b) * read;
+    }
+    T* to = g.given_back + static_cast<std::int64_t>(piece.number) * 2 * kNodeValues;
+    given[0].store(to), given[1].store(to + kNodeValues);
+  });
+}
+
+// Adds what the pieces were given to one strand's velocities and, where `cell` is above 0, to its positions.
+template <class T>
+RINGLET_FUNCTION void give_back(const GridData<T>& g, T cell, int strand) {
   const int batch = strand / kLanes, lane = strand % kLanes;
   const int first = g.first_particle[strand], count = g.first_particle[strand + 1] - first;
   for (int i = g.step.clamped; i < count; ++i) {
-    T given[3] = {};
+    Octet<T> given(T(0));
     const auto add = [&](std::int32_t segment, int end) {
       for (std::int32_t q = g.first_piece[segment]; q < g.first_piece[segment + 1]; ++q)
-        for (int c = 0; c < 3; ++c) given[c] += g.given_back[static_cast<std::int64_t>(q) * 6 + 3 * end + c];
+        given = given + Octet<T>::load(g.given_back + (static_cast<std::int64_t>(q) * 2 + end) * kNodeValues);
     };
     if (i > 0) add(first + i - 1, 1);
     if (i + 1 < count) add(first + i, 0);
     const std::int64_t base = (static_cast<std::int64_t>(g.step.batches.row[batch]) + i) * 3 * kLanes + lane;
-    for (int c = 0; c < 3; ++c) {
+    const auto turned = [&](int c, int value) {
       const double* r = g.step.axes.rotation + 3 * c;
-      const T world =
-          static_cast<T>(r[0]) * given[0] + static_cast<T>(r[1]) * given[1] + static_cast<T>(r[2]) * given[2];
-      to[base + c * kLanes] = fma(factor, world, to[base + c * kLanes]);
+      return static_cast<T>(r[0]) * given.v[kFaceMass + value] +
+             static_cast<T>(r[1]) * given.v[kFaceMass + 2 + value] +
+             static_cast<T>(r[2]) * given.v[kFaceMass + 4 + value];
+    };
+    for (int c = 0; c < 3; ++c) {
+      g.step.state.velocity[base + c * kLanes] += turned(c, 0);
+      if (cell > T(0)) g.step.state.position[base + c * kLanes] += cell * turned(c, 1);
     }
   }
 }
@@ -341,25 +382,24 @@ RINGLET_FUNCTION void give_back(const GridData<T>& g, T* to, T factor, int stran
 template <class T>
 RINGLET_FUNCTION void rest_densities(const GridData<T>& g, T least, std::int32_t occupied) {
   const std::int32_t tile = g.occupied_tile[occupied];
-  std::int32_t at[3];
-  tile_coordinates(g, tile, at);
+  std::int32_t corner[3];
+  tile_corner(g, tile, corner);
   T density[kHaloNodes];
   for (int n = 0; n < kHaloNodes; ++n) density[n] = T(0);
   for_each_halo_node(
       g, tile, [&](int halo, std::int64_t node) { density[halo] = g.node[node * kNodeValues + kDensity]; });
-  for_each_piece_of_tile(
-      g, occupied, [&](std::uint32_t, const Segment<T>& segment, Piece piece, std::int32_t end) {
-        for (std::int32_t s = piece.first; s < end; ++s) {
-          const SampleWeights<T> w = weights_in_tile(at, segment.place(segment.parameter(s)));
-          T greatest = least;
-          for (int k = 0; k < 3; ++k)
-            for (int j = 0; j < 3; ++j)
-              for (int i = 0; i < 3; ++i)
-                if (w.x.middle[i] > T(0) && w.y.middle[j] > T(0) && w.z.middle[k] > T(0))
-                  greatest = max(greatest, density[w.corner + (k * kHaloEdge + j) * kHaloEdge + i]);
-          g.rest_density[g.first_sample[piece.segment] + s] = greatest;
-        }
-      });
+  for_each_piece_of_tile(g, occupied, [&](const TilePiece& piece, const Segment<T>& segment) {
+    for (std::int32_t s = piece.first; s < piece.end; ++s) {
+      const SampleWeights<T> w(corner, segment.place(segment.parameter(s)));
+      T greatest = least;
+      for (int k = 0; k < 3; ++k)
+        for (int j = 0; j < 3; ++j)
+          for (int i = 0; i < 3; ++i)
+            if (w.x[i].v[kDensity] * w.y[j].v[kDensity] * w.z[k].v[kDensity] > T(0))
+              greatest = max(greatest, density[w.corner + (k * kHaloEdge + j) * kHaloEdge + i]);
+      g.rest_density[piece.rest - piece.first + s] = greatest;
+    }
+  });
 }
 
 }  // namespace RINGLET_ISA

@@ -1,5 +1,6 @@
 // Solid walls in the grid: what share of each face lies outside the solids, and how fast the wall moves there
-// (Batty et al. 2007). Only tiles near a solid have any.
+// (Batty et al. 2007). Only tiles near a solid have any, and of their faces those of fluid cells are looked
+// at.
 #pragma once
 #include "kernels/grid/transfer.h"
 #include "kernels/solid/surface.h"
@@ -27,14 +28,14 @@ RINGLET_FUNCTION bool near_wall(const GridData<T>& g, std::int32_t tile) {
   // From the middle of 2 x 2 x 2 cells to the farthest of their faces, and half a cell for what is in part
   // open.
   const T reach = static_cast<T>(2.25 * g.step.axes.cell);
-  std::int32_t at[3];
-  tile_coordinates(g, tile, at);
+  std::int32_t corner[3];
+  tile_corner(g, tile, corner);
   for (std::int32_t s = 0; s < g.step.solid_count; ++s) {
     const SolidView& solid = g.step.solids[s];
     const T offset = static_cast<T>(solid.offset);
     for (int part = 0; part < 8; ++part) {
       double middle[3];
-      for (int c = 0; c < 3; ++c) middle[c] = kTileEdge * at[c] + 1 + 2 * (part >> c & 1);
+      for (int c = 0; c < 3; ++c) middle[c] = kTileEdge * g.low[c] + corner[c] + 1 + 2 * (part >> c & 1);
       const Vector3<T> p = in_solid<T>(g.step.axes, solid, middle);
       if (BlendedSample<T>(solid, p).distance - offset < reach) return true;
       // A band narrower than the reach does not tell.
@@ -74,30 +75,6 @@ RINGLET_FUNCTION T wall_velocity(const GridData<T>& g, const SolidView& solid, c
     along += static_cast<T>(axes.rotation[3 * c + axis] * (own - carried));
   }
   return along;
-}
-
-template <class T>
-RINGLET_FUNCTION void find_openings(const GridData<T>& g, std::int32_t tile, int cell) {
-  std::int32_t at[3];
-  tile_coordinates(g, tile, at);
-  T* to = g.opening + (static_cast<std::int64_t>(g.wall[tile]) * kTileCells + cell) * kWallValues;
-  for (int axis = 0; axis < 3; ++axis) {
-    double place[3];
-    for (int c = 0; c < 3; ++c)
-      place[c] = kTileEdge * at[c] + coordinate_in_tile(cell, c) + (c == axis ? 0.0 : 0.5);
-    T open = T(1), velocity = T(0);
-    for (std::int32_t s = 0; s < g.step.solid_count; ++s) {
-      const SolidView& solid = g.step.solids[s];
-      const Vector3<T> p = in_solid<T>(g.step.axes, solid, place);
-      const BlendedSample<T> level(solid, p);
-      const T distance = (level.distance - static_cast<T>(solid.offset)) / static_cast<T>(g.step.axes.cell);
-      const T outside = min(max(distance + T(0.5), T(0)), T(1));
-      if (!(outside < open)) continue;
-      open = outside;
-      velocity = wall_velocity(g, solid, place, p, level.first.triangle, axis);
-    }
-    to[axis] = open, to[3 + axis] = velocity;
-  }
 }
 
 template <class T>

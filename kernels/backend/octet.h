@@ -1,0 +1,119 @@
+// Eight reals side by side: a node's values. On the host a vector of the compiler's, split to what the
+// processor has; on a device an array. Products and sums are rounded one by one, alike everywhere.
+#pragma once
+#include <cstdint>
+
+#include "kernels/backend/real.h"
+
+#if !defined(__CUDACC__)
+#include <immintrin.h>
+#endif
+
+namespace ringlet::kernels {
+inline namespace RINGLET_ISA {
+
+template <class T>
+struct Octet {
+#if defined(__CUDACC__)
+  struct Vector {
+    T lane[8];
+    RINGLET_KERNEL T& operator[](int k) { return lane[k]; }
+    RINGLET_KERNEL const T& operator[](int k) const { return lane[k]; }
+  };
+#else
+  typedef T Vector __attribute__((vector_size(8 * sizeof(T))));
+#endif
+  Vector v;
+
+  Octet() = default;
+  RINGLET_KERNEL explicit Octet(T all) {
+#if defined(__CUDACC__)
+    RINGLET_UNROLL
+    for (int k = 0; k < 8; ++k) v[k] = all;
+#else
+    v = all - Vector{};
+#endif
+  }
+  // `p` aligned to eight values
+  RINGLET_KERNEL static Octet load(const T* p) { return *reinterpret_cast<const Octet*>(p); }
+  RINGLET_KERNEL void store(T* p) const { *reinterpret_cast<Octet*>(p) = *this; }
+
+  friend RINGLET_KERNEL Octet operator+(const Octet& a, const Octet& b) {
+    return each(a, b, [](auto x, auto y) { return x + y; });
+  }
+  friend RINGLET_KERNEL Octet operator-(const Octet& a, const Octet& b) {
+    return each(a, b, [](auto x, auto y) { return x - y; });
+  }
+  friend RINGLET_KERNEL Octet operator*(const Octet& a, const Octet& b) {
+    return each(a, b, [](auto x, auto y) { return x * y; });
+  }
+
+ private:
+  template <class F>
+  static RINGLET_KERNEL Octet each(const Octet& a, const Octet& b, const F& f) {
+    Octet result;
+#if defined(__CUDACC__)
+    RINGLET_UNROLL
+    for (int k = 0; k < 8; ++k) result.v[k] = f(a.v[k], b.v[k]);
+#else
+    result.v = f(a.v, b.v);
+#endif
+    return result;
+  }
+};
+
+// `a` in the lanes whose bits are set, `b` in the others.
+template <int kLanesOfA, class T>
+RINGLET_KERNEL Octet<T> choose(const Octet<T>& a, const Octet<T>& b) {
+  Octet<T> result;
+  RINGLET_UNROLL
+  for (int k = 0; k < 8; ++k) result.v[k] = kLanesOfA >> k & 1 ? a.v[k] : b.v[k];
+  return result;
+}
+
+// max(a, 0)
+template <class T>
+RINGLET_KERNEL Octet<T> positive(const Octet<T>& a) {
+  Octet<T> result;
+#if defined(__CUDACC__)
+  RINGLET_UNROLL
+  for (int k = 0; k < 8; ++k) result.v[k] = max(a.v[k], T(0));
+#else
+  result.v = a.v > T(0) ? a.v : Octet<T>(T(0)).v;
+#endif
+  return result;
+}
+
+// The nearest integers, halves to the even one.
+RINGLET_KERNEL Octet<std::int32_t> nearest(const Octet<float>& a) {
+  Octet<std::int32_t> result;
+#if defined(__CUDACC__)
+  RINGLET_UNROLL
+  for (int k = 0; k < 8; ++k) {
+#if defined(__CUDA_ARCH__)
+    result.v[k] = __float2int_rn(a.v[k]);
+#else
+    result.v[k] = static_cast<std::int32_t>(__builtin_lrintf(a.v[k]));
+#endif
+  }
+#elif defined(__AVX__)
+  result.v = reinterpret_cast<Octet<std::int32_t>::Vector>(_mm256_cvtps_epi32(a.v));
+#else
+  const float* lanes = reinterpret_cast<const float*>(&a.v);
+  auto* to = reinterpret_cast<__m128i*>(&result.v);
+  to[0] = _mm_cvtps_epi32(_mm_load_ps(lanes)), to[1] = _mm_cvtps_epi32(_mm_load_ps(lanes + 4));
+#endif
+  return result;
+}
+RINGLET_KERNEL Octet<std::int64_t> nearest(const Octet<double>& a) {
+  Octet<std::int64_t> result;
+#if defined(__AVX512DQ__) && !defined(__CUDACC__)
+  result.v = reinterpret_cast<Octet<std::int64_t>::Vector>(_mm512_cvtpd_epi64(a.v));
+#else
+  for (int k = 0; k < 8; ++k) result.v[k] = __builtin_llrint(a.v[k]);
+#endif
+  return result;
+}
+
+}  // namespace RINGLET_ISA
+}  // namespace ringlet::kernels

@@ -20,20 +20,21 @@ class GridSolver final : public HairGrid<T> {
   void at_rest(const GridStep<T>& step) override {
     number_particles(step);
     if (data_.particles == 0) return;
-    const GridData<T>& g = data_;
-    backend_.parallel_for("grid: rest", samples_, [g] RINGLET_LAMBDA(int s) { g.rest_density[s] = T(1); });
-    most_rest_density_ = 1;
-    fill();
-    const double hair = sum_nodes([] RINGLET_LAMBDA(double density) { return density; });
-    const double square = sum_nodes([] RINGLET_LAMBDA(double density) { return density * density; });
-    const double mean = hair > 0 ? square / hair : 0;
-    const T least = static_cast<T>(mean > kLeastStrands ? mean : kLeastStrands);
-    backend_.parallel_for(
-        "grid: rest density", g.occupied,
-        [g = data_, least] RINGLET_LAMBDA(int tile) { rest_densities(g, least, tile); }, kTileChunk);
-    most_rest_density_ = backend_.largest("grid: rest density", samples_, 1, [g] RINGLET_LAMBDA(int s) {
-      return static_cast<double>(g.rest_density[s]);
+    most_rest_density_ = kLeastStrands;
+    backend_.parallel_for("grid: rest density", samples_, [g = data_] RINGLET_LAMBDA(int s) {
+      g.rest_density[s] = static_cast<T>(kLeastStrands);
     });
+    // Where the lattice lies beside the hair is chance: the rest state is looked at by eight of them.
+    for (int shift = 0; shift < 8; ++shift) {
+      data_.step.axes = shifted(step.axes, shift);
+      fill();
+      backend_.parallel_for(
+          "grid: rest density", data_.occupied, [g = data_] RINGLET_LAMBDA(int t) { rest_densities(g, t); },
+          kTileChunk);
+      most_rest_density_ = backend_.largest(
+          "grid: rest density", samples_, kLeastStrands,
+          [g = data_] RINGLET_LAMBDA(int s) { return static_cast<double>(g.rest_density[s]); });
+    }
   }
 
   GridFigures run(const GridStep<T>& step) override {
@@ -60,6 +61,14 @@ class GridSolver final : public HairGrid<T> {
            occupied_tile_.bytes() + tile_piece_.bytes() + flag_.bytes() + around_key_.bytes() +
            around_.bytes() + sums_.bytes() + node_.bytes() + lightness_.bytes() + wall_.bytes() +
            opening_.bytes() + wall_tile_.bytes() + fluid_.bytes() + first_cell_.bytes();
+  }
+
+  // The same axes, half a cell aside along those whose bits are set.
+  static GridAxes shifted(GridAxes axes, int shift) {
+    for (int axis = 0; axis < 3; ++axis)
+      for (int c = 0; c < 3; ++c)
+        if (shift >> axis & 1) axes.origin[c] += 0.5 * axes.cell * axes.rotation[3 * c + axis];
+    return axes;
   }
 
   // ---- The strands' numbers
@@ -287,17 +296,6 @@ class GridSolver final : public HairGrid<T> {
     for (int v = 0; v < kNodeValues; ++v) data_.scale[v] = static_cast<T>(unit);
     data_.scale[kTarget] = static_cast<T>(unit / most_rest_density_);
     for (int v = kFaceMass + 1; v < kNodeValues; v += 2) data_.scale[v] = static_cast<T>(unit / speed);
-  }
-
-  template <class F>
-  double sum_nodes(const F& f) {
-    return backend_.sum("grid: sum", data_.tiles, [g = data_, f] RINGLET_LAMBDA(int tile) {
-      double sum = 0;
-      for (int cell = 0; cell < kTileCells; ++cell)
-        sum += f(static_cast<double>(
-            g.node[(static_cast<std::int64_t>(tile) * kTileCells + cell) * kNodeValues + kDensity]));
-      return sum;
-    });
   }
 
   // ---- Cells

@@ -8,9 +8,9 @@
 //
 //   density   lambda = sum of w(x) l        [cell edges of hair in a cell]: lambda strands cross it
 //   target    lambda_t = sum of w l lambda_0 / lambda, lambda_0 the greatest density that the sample had
-//   about it
-//             at rest, and no less than the mean one or kLeastStrands: hair at rest is nowhere over its
-//             target, and cells with hardly a strand are no continuum
+//             about it at rest, wherever the lattice lay, and no less than kLeastStrands: hair at rest is
+//             nowhere over its target, however it is carried through the grid, and cells with hardly a
+//             strand are no continuum
 //   velocity  on the cells' faces, u_f = sum of w m u / m_f, relative to the moving axes
 //
 // with w the trilinear weights of a staggered lattice. A node holds the values of one cell and of the faces
@@ -22,7 +22,7 @@
 
 namespace ringlet::kernels {
 
-inline constexpr double kLeastStrands = 2;  // in a cell
+inline constexpr double kLeastStrands = 4;  // in a cell
 // A cell is fluid where its density is above this share of its target; elsewhere is air, of no pressure.
 inline constexpr double kFluidShare = 0.5;
 // A face weighs at least this share of the face across the cell: pressure must not act on nothing.

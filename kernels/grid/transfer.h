@@ -377,10 +377,10 @@ RINGLET_FUNCTION void give_back(const GridData<T>& g, T cell, int strand) {
   }
 }
 
-// ---- At rest: the greatest density about each sample of an occupied tile.
+// ---- At rest: the greatest density about each sample of an occupied tile, or what was found before.
 
 template <class T>
-RINGLET_FUNCTION void rest_densities(const GridData<T>& g, T least, std::int32_t occupied) {
+RINGLET_FUNCTION void rest_densities(const GridData<T>& g, std::int32_t occupied) {
   const std::int32_t tile = g.occupied_tile[occupied];
   std::int32_t corner[3];
   tile_corner(g, tile, corner);
@@ -391,13 +391,12 @@ RINGLET_FUNCTION void rest_densities(const GridData<T>& g, T least, std::int32_t
   for_each_piece_of_tile(g, occupied, [&](const TilePiece& piece, const Segment<T>& segment) {
     for (std::int32_t s = piece.first; s < piece.end; ++s) {
       const SampleWeights<T> w(corner, segment.place(segment.parameter(s)));
-      T greatest = least;
+      T& greatest = g.rest_density[piece.rest - piece.first + s];
       for (int k = 0; k < 3; ++k)
         for (int j = 0; j < 3; ++j)
           for (int i = 0; i < 3; ++i)
             if (w.x[i].v[kDensity] * w.y[j].v[kDensity] * w.z[k].v[kDensity] > T(0))
               greatest = max(greatest, density[w.corner + (k * kHaloEdge + j) * kHaloEdge + i]);
-      g.rest_density[piece.rest - piece.first + s] = greatest;
     }
   });
 }

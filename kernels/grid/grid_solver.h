@@ -2,6 +2,7 @@
 // terms).
 #pragma once
 #include "kernels/grid/fluid.h"
+#include "kernels/grid/hair_shelter.h"
 #include "kernels/grid/pressure.h"
 #include "kernels/launch/hair_grid.h"
 
@@ -53,6 +54,28 @@ class GridSolver final : public HairGrid<T> {
     return figures;
   }
 
+  void shelter(const HairShelter<T>& shelter) override {
+    if (data_.particles == 0) return;
+    tile_density_.resize(data_.tiles), tile_depth_.resize(data_.tiles);
+    const TileShelter<T> found = tile_shelter(shelter);
+    backend_.parallel_for(
+        "grid: mean density", data_.tiles,
+        [g = data_, found] RINGLET_LAMBDA(int tile) { found.tile_density[tile] = mean_density(g, tile); },
+        kTileChunk);
+    backend_.parallel_for(
+        "grid: depth", data_.tiles,
+        [g = data_, found] RINGLET_LAMBDA(int tile) {
+          found.tile_depth[tile] = depth_before(g, found, tile);
+        },
+        kTileChunk);
+    backend_.parallel_for(
+        "grid: shelter", data_.lanes,
+        [g = data_, found, share = shelter.share] RINGLET_LAMBDA(int s) {
+          shelter_segments(g, found, share, s);
+        },
+        256);
+  }
+
   std::size_t bytes() const override {
     return backend_.bytes() + pressure_.bytes() + first_particle_.bytes() + ends_.bytes() +
            first_sample_.bytes() + rest_density_.bytes() + particle_.bytes() + first_piece_.bytes() +
@@ -60,7 +83,22 @@ class GridSolver final : public HairGrid<T> {
            given_back_.bytes() + tile_key_.bytes() + near_.bytes() + occupied_key_.bytes() +
            occupied_tile_.bytes() + tile_piece_.bytes() + flag_.bytes() + around_key_.bytes() +
            around_.bytes() + sums_.bytes() + node_.bytes() + lightness_.bytes() + wall_.bytes() +
-           opening_.bytes() + wall_tile_.bytes() + fluid_.bytes() + first_cell_.bytes();
+           opening_.bytes() + wall_tile_.bytes() + fluid_.bytes() + first_cell_.bytes() +
+           tile_density_.bytes() + tile_depth_.bytes();
+  }
+
+  // Without wind there is no upwind: no tile is before another.
+  TileShelter<T> tile_shelter(const HairShelter<T>& shelter) const {
+    const GridAxes& axes = data_.step.axes;
+    const double* wind = shelter.wind;
+    const double speed = __builtin_sqrt(wind[0] * wind[0] + wind[1] * wind[1] + wind[2] * wind[2]);
+    TileShelter<T> found{{}, 0, tile_density_.data(), tile_depth_.data()};
+    for (int c = 0; c < 3 && speed > 0; ++c)
+      found.upwind[c] =
+          -(axes.rotation[c] * wind[0] + axes.rotation[3 + c] * wind[1] + axes.rotation[6 + c] * wind[2]) /
+          speed;
+    if (speed > 0) found.per_tile = shelter.strength * 2 * shelter.radius * kTileEdge / axes.cell;
+    return found;
   }
 
   // The same axes, half a cell aside along those whose bits are set.
@@ -146,7 +184,8 @@ class GridSolver final : public HairGrid<T> {
             }));
       };
       data_.low[c] = -bound(T(-1)) - 1;
-      while (bound(T(1)) + 1 - data_.low[c] >= 1 << bits) ++bits;
+      data_.extent[c] = bound(T(1)) + 2 - data_.low[c];
+      while (data_.extent[c] > 1 << bits) ++bits;
     }
     return 3 * bits;
   }
@@ -463,6 +502,7 @@ class GridSolver final : public HairGrid<T> {
   Buffer<std::int32_t> first_particle_, first_sample_, first_piece_, near_, occupied_tile_, tile_piece_,
       flag_, wall_, wall_tile_, first_cell_;
   Buffer<unsigned char> ends_;
+  Buffer<T> tile_density_, tile_depth_;
   Buffer<T> rest_density_, particle_, given_back_, node_, lightness_, opening_;
   Buffer<Piece> piece_;
   Buffer<TilePiece> tile_pieces_;

@@ -55,6 +55,15 @@ struct GridStep {
   std::int32_t solid_count;
 };
 
+// The wind that gets through the hair (hair_shelter.h).
+template <class T>
+struct HairShelter {
+  double wind[3];   // its direction in the world, of any length [m/s]
+  double strength;  // [-]
+  double radius;    // mean of the hair's [m]
+  T* share;         // [rows] out: of the wind, at the segment that begins there
+};
+
 struct GridFigures {
   double iterations = 0;  // of conjugate gradients
   double residual = 0;    // relative, largest of the solves
@@ -128,7 +137,8 @@ struct GridData {
   std::uint32_t* piece_of;   // [pieces] sorted by tile
   T* given_back;             // [pieces][6] to the segment's first and second particle
   // Tiles, sorted by key
-  std::int32_t low[3];  // tile coordinates of key 0
+  std::int32_t low[3];     // tile coordinates of key 0
+  std::int32_t extent[3];  // tiles along each axis
   std::int32_t tiles;
   const std::uint64_t* tile_key;      // [tiles]
   std::int32_t* near;                 // [tiles][kAround] tiles about it, x fastest, -1: none

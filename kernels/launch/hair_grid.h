@@ -17,6 +17,8 @@ class HairGrid {
   virtual void at_rest(const GridStep<T>& step) = 0;
   // Velocities, and positions of hair that is too dense, become what the pressure leaves.
   virtual GridFigures run(const GridStep<T>& step) = 0;
+  // How much of the wind gets through the hair as the last run found it.
+  virtual void shelter(const HairShelter<T>& shelter) = 0;
   virtual std::size_t bytes() const = 0;
 };
 

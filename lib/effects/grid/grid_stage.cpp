@@ -30,7 +30,9 @@ class GridStage : public Stage<T> {
         views_(solids.size()),
         lengths_(scene, model, state),
         grid_(kernels::make_hair_grid<T>(kernels::instruction_set_named(executor.instruction_set().c_str()),
-                                         {run_chunks, nullptr})) {}
+                                         {run_chunks, nullptr})) {
+    if (options_.shelter) state_.shelter.assign(state_.position.size() / 3, T(1));
+  }
 
   std::string name() const override { return "grid"; }
   std::size_t bytes() const override {
@@ -45,7 +47,7 @@ class GridStage : public Stage<T> {
     cell_ = side > 0 ? side / options_.resolution : 1;
     kernels::GridStep<T> step = step_of(scene_.model.substeps / scene_.frames.fps);
     step.axes = moving_axes(model_, rest, cell_, step.substep);
-    state::StrandState<T>& posed = const_cast<state::StrandState<T>&>(rest);
+    state::StrandState<T> posed = rest;  // only read
     step.state = posed.view();
     step.root_points = rest.root_points.data();
     grid_->at_rest(step);
@@ -60,6 +62,7 @@ class GridStage : public Stage<T> {
     kernels::GridStep<T> step = step_of(substep.step);
     step.axes = moving_axes(model_, state_, cell_, substep.step);
     const kernels::GridFigures figures = grid_->run(step);
+    if (options_.shelter) find_shelter();
     executor.submit(state_);
     if (figures.moved) {
       lengths_.hold(executor, substep, step.interval, report);
@@ -86,6 +89,15 @@ class GridStage : public Stage<T> {
     step.solids = views_.data();
     step.solid_count = static_cast<std::int32_t>(views_.size());
     return step;
+  }
+
+  void find_shelter() {
+    kernels::HairShelter<T> shelter{};
+    for (int c = 0; c < 3; ++c) shelter.wind[c] = state_.wind[c];
+    shelter.strength = *options_.shelter;
+    shelter.radius = mean_radius(model_);
+    shelter.share = state_.shelter.data();
+    grid_->shelter(shelter);
   }
 
   void gather(const kernels::GridFigures& figures, FrameReport& report) const {

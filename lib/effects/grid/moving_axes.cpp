@@ -71,6 +71,18 @@ double longest_side(const state::StrandModel<T>& model, const state::StrandState
   return box.isEmpty() ? 0 : box.sizes().maxCoeff();
 }
 
+template <class T>
+double mean_radius(const state::StrandModel<T>& model) {
+  constexpr double kUnit = 1e3;  // a mean is exact to a billionth of what is added [1/mm]
+  Mean radius;
+  for (std::size_t s = 0; s < model.layout.strands(); ++s)
+    for (int i = 0; i < model.living(s); ++i)
+      radius.add(kUnit * static_cast<double>(model.radius[model.layout.at(s, i, 1, 0)]));
+  return radius.value() / kUnit;
+}
+
+template double mean_radius(const state::StrandModel<float>&);
+template double mean_radius(const state::StrandModel<double>&);
 template kernels::GridAxes moving_axes(const state::StrandModel<float>&, const state::StrandState<float>&,
                                        double, double);
 template kernels::GridAxes moving_axes(const state::StrandModel<double>&, const state::StrandState<double>&,

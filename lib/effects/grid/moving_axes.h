@@ -17,4 +17,8 @@ template <class T>
 double longest_side(const state::StrandModel<T>& model, const state::StrandState<T>& state,
                     const kernels::GridAxes& axes);
 
+// The mean radius of the hair [m]; for a model that has radii.
+template <class T>
+double mean_radius(const state::StrandModel<T>& model);
+
 }  // namespace ringlet::effects

@@ -3,7 +3,6 @@
 #pragma once
 #include <tbb/parallel_for.h>
 
-#include <functional>
 #include <vector>
 
 #include "kernels/launch/contacts.h"
@@ -67,6 +66,8 @@ class HairRun {
     for (std::size_t s = 0; s < strands.size(); ++s) poses_[s].position = strands[s].points[0];
     state::pose_at_rest<T>(state, model, poses_);
     for (std::size_t s = 0; s < strands.size(); ++s)
+      state::set_root_motion<T>(state, model.layout, s, poses_[s], poses_[s]);  // roots stay
+    for (std::size_t s = 0; s < strands.size(); ++s)
       for (std::size_t i = 0; i < strands[s].points.size(); ++i)
         for (int c = 0; c < 3; ++c)
           state.velocity[model.layout.at(s, static_cast<int>(i), 3, c)] = T(strands[s].velocity[c]);
@@ -87,7 +88,8 @@ class HairRun {
   // What the next application starts from.
   void remember() { start_ = state.position, start_roots_ = state.root_points; }
 
-  HairContactFigures collide() {
+  // `seconds`: that the way since `remember` took.
+  HairContactFigures collide(double seconds) {
     step.batches = model.view(), step.row_count = static_cast<std::int32_t>(model.layout.rows());
     step.state = state.view(), step.radius = radius_.data();
     step.start = start_.data(), step.start_root_points = start_roots_.data();
@@ -96,7 +98,7 @@ class HairRun {
     for (int pass = 0; pass < passes; ++pass) {
       contacts.pass(step, found);
       if (found.contacts == 0) break;
-      hold_lengths(kFrame);
+      hold_lengths(seconds);
     }
     return found;
   }
@@ -113,15 +115,15 @@ class HairRun {
     kernels_.length_step(lengths, 0, model.layout.batches(), scratch_.data());
   }
 
-  // One frame. `after_substep` may move what strands do not collide with themselves.
-  HairContactFigures frame(const std::function<void()>& after_substep = [] {}) {
+  // One frame, with contacts at its end or after each substep.
+  HairContactFigures frame(bool each_substep = false) {
+    HairContactFigures found;
     remember();
     for (int k = 0; k < kSubsteps; ++k) {
       move_strands();
-      if (k + 1 < kSubsteps) after_substep();
+      if (each_substep || k + 1 == kSubsteps) found = collide(each_substep ? kStep : kFrame);
+      if (each_substep) remember();
     }
-    const HairContactFigures found = collide();
-    after_substep();
     return found;
   }
 

@@ -27,13 +27,49 @@ struct MotionSum {
 };
 inline constexpr double kMotionUnit = 1.0 / (1LL << 32);  // [m]
 
+// At one node: the mean displacement [m] of what is about it, where there is something.
+struct MotionNode {
+  float mean[3];
+  bool known;
+};
+
+RINGLET_KERNEL MotionNode mean_of(const MotionSum& sum) {
+  MotionNode node{{0, 0, 0}, sum.count > 0};
+  if (node.known)
+    for (int c = 0; c < 3; ++c)
+      node.mean[c] = static_cast<float>(kMotionUnit * static_cast<double>(sum.displacement[c]) /
+                                        static_cast<double>(sum.count));
+  return node;
+}
+
+RINGLET_FUNCTION MotionNode mean_of_neighbours(const MotionLattice& lattice, const MotionNode* nodes,
+                                               std::int32_t node) {
+  const std::int32_t at[3] = {node % lattice.nodes[0], node / lattice.nodes[0] % lattice.nodes[1],
+                              node / (lattice.nodes[0] * lattice.nodes[1])};
+  const std::int32_t stride[3] = {1, lattice.nodes[0], lattice.nodes[0] * lattice.nodes[1]};
+  MotionNode mean{};
+  float count = 0;
+  for (int axis = 0; axis < 3; ++axis)
+    for (int side = -1; side <= 1; side += 2) {
+      if (at[axis] + side < 0 || at[axis] + side >= lattice.nodes[axis]) continue;
+      const MotionNode& other = nodes[node + side * stride[axis]];
+      if (!other.known) continue;
+      for (int c = 0; c < 3; ++c) mean.mean[c] += other.mean[c];
+      count += 1;
+    }
+  mean.known = count > 0;
+  for (int c = 0; c < 3 && mean.known; ++c) mean.mean[c] /= count;
+  return mean;
+}
+
 struct MeanMotion {
   float mean[3];    // at a place [m]
   float spread[3];  // how much it changes over a metre, at most [-]
 };
 
-// Mean motion at a place near the hair.
-RINGLET_KERNEL MeanMotion mean_motion(const MotionLattice& lattice, const MotionSum* sums, const float* at) {
+// At a place near the hair: between the nodes about it that know.
+RINGLET_KERNEL MeanMotion mean_motion(const MotionLattice& lattice, const MotionNode* nodes,
+                                      const float* at) {
   std::int32_t cell[3];
   float along[3];
   for (int c = 0; c < 3; ++c) {
@@ -42,21 +78,18 @@ RINGLET_KERNEL MeanMotion mean_motion(const MotionLattice& lattice, const Motion
     cell[c] = place < static_cast<float>(last) ? static_cast<std::int32_t>(place) : last;
     along[c] = min(place - static_cast<float>(cell[c]), 1.0f);
   }
-  float weights = 0, mean[3] = {}, low[3], high[3];
+  float weights = 0, mean[3] = {}, low[3] = {}, high[3] = {};
   for (int corner = 0; corner < 8; ++corner) {
-    const int up[3] = {corner & 1, corner >> 1 & 1, corner >> 2};
-    const MotionSum& sum = sums[lattice.number(cell[0] + up[0], cell[1] + up[1], cell[2] + up[2])];
-    if (sum.count == 0) continue;
-    float weight = 1e-6f;  // a corner's, and never nothing
-    float product = 1;
-    for (int c = 0; c < 3; ++c) product *= up[c] ? along[c] : 1 - along[c];
-    weight += product;
+    const int x = corner & 1, y = corner >> 1 & 1, z = corner >> 2;
+    const MotionNode& node = nodes[lattice.number(cell[0] + x, cell[1] + y, cell[2] + z)];
+    if (!node.known) continue;
+    const float weight =
+        (x ? along[0] : 1 - along[0]) * (y ? along[1] : 1 - along[1]) * (z ? along[2] : 1 - along[2]) +
+        1e-6f;  // never nothing
     for (int c = 0; c < 3; ++c) {
-      const float value = static_cast<float>(kMotionUnit * static_cast<double>(sum.displacement[c]) /
-                                             static_cast<double>(sum.count));
-      low[c] = weights == 0 ? value : min(low[c], value);
-      high[c] = weights == 0 ? value : max(high[c], value);
-      mean[c] = fma(weight, value, mean[c]);
+      low[c] = weights == 0 ? node.mean[c] : min(low[c], node.mean[c]);
+      high[c] = weights == 0 ? node.mean[c] : max(high[c], node.mean[c]);
+      mean[c] = fma(weight, node.mean[c], mean[c]);
     }
     weights += weight;
   }

@@ -29,15 +29,16 @@ class Neighbours {
   std::int32_t* a() { return a_.data(); }
   std::int32_t* b() { return b_.data(); }
   std::size_t bytes() const {
-    return sums_.bytes() + box_.bytes() + key_.bytes() + order_.bytes() + first_.bytes() + segment_.bytes() +
-           strand_.bytes() + components_.bytes() + pool_.bytes() + next_.bytes() + last_.bytes() +
-           count_.bytes() + a_.bytes() + b_.bytes();
+    return sums_.bytes() + nodes_.bytes() + filled_.bytes() + box_.bytes() + key_.bytes() + order_.bytes() +
+           first_.bytes() + segment_.bytes() + strand_.bytes() + components_.bytes() + pool_.bytes() +
+           next_.bytes() + last_.bytes() + count_.bytes() + a_.bytes() + b_.bytes();
   }
 
  private:
   // What counts as near, in sums of radii: about as far as contacts move hair in an application.
   static constexpr double kMarginReaches = 4;
-  static constexpr int kLatticeCells = 20;  // of the mean motion, along the longest axis
+  static constexpr int kLatticeCells = 8;  // of the mean motion, along the longest axis
+  static constexpr float kSpreadShare = 1;
 
   // Lowest and highest of f(particle)[axis] over particles with a segment.
   template <class Values>
@@ -55,22 +56,34 @@ class Neighbours {
     }
   }
 
-  void find_mean_motion(Backend& backend, const HairPlaces<T>& places, const std::int32_t* strand,
-                        std::int32_t particles) {
-    float high[3];
+  // Nodes far enough apart that neighbours are between the same ones at both times, however they have moved
+  // against one another: then the mean motion is the same for both, but for its slope.
+  void make_lattice(Backend& backend, const HairPlaces<T>& places, const std::int32_t* strand,
+                    std::int32_t particles) {
+    float high[3], slowest[3], fastest[3];
     find_bounds(
         backend, strand, particles,
         [=] RINGLET_LAMBDA(std::int32_t p, int c) { return (&places.end[p].x)[c]; }, lattice_.low, high);
-    float size = 1e-3f;
-    for (int c = 0; c < 3; ++c) size = max(size, high[c] - lattice_.low[c]);
-    lattice_.per_cell = static_cast<float>(kLatticeCells) / size;
+    find_bounds(
+        backend, strand, particles,
+        [=] RINGLET_LAMBDA(std::int32_t p, int c) { return (&places.end[p].x)[c] - (&places.start[p].x)[c]; },
+        slowest, fastest);
+    float size = 1e-3f, apart = 0;
+    for (int c = 0; c < 3; ++c)
+      size = max(size, high[c] - lattice_.low[c]), apart = max(apart, fastest[c] - slowest[c]);
+    lattice_.per_cell = 1 / max(size / static_cast<float>(kLatticeCells), 0.5f * apart);
     for (int c = 0; c < 3; ++c)
       lattice_.nodes[c] = static_cast<std::int32_t>((high[c] - lattice_.low[c]) * lattice_.per_cell) + 2;
-    sums_.resize(lattice_.total());
-    MotionSum* sums = sums_.data();
-    backend.parallel_for("clear motion", lattice_.total(),
-                         [=] RINGLET_LAMBDA(std::int32_t k) { sums[k] = MotionSum{}; });
+  }
+
+  void find_mean_motion(Backend& backend, const HairPlaces<T>& places, const std::int32_t* strand,
+                        std::int32_t particles) {
+    make_lattice(backend, places, strand, particles);
     const MotionLattice lattice = lattice_;
+    sums_.resize(lattice.total()), nodes_.resize(lattice.total()), filled_.resize(lattice.total());
+    MotionSum* sums = sums_.data();
+    backend.parallel_for("clear motion", lattice.total(),
+                         [=] RINGLET_LAMBDA(std::int32_t k) { sums[k] = MotionSum{}; });
     backend.parallel_for("sum motion", particles, [=] RINGLET_LAMBDA(std::int32_t p) {
       if (strand[p] < 0) return;
       const Place<T>&end = places.end[p], &start = places.start[p];
@@ -84,6 +97,18 @@ class Neighbours {
                    static_cast<long long>(((&end.x)[c] - (&start.x)[c]) * (1 / kMotionUnit)));
       atomic_add(&sum.count, 1LL);
     });
+    MotionNode* nodes = nodes_.data();
+    backend.parallel_for("mean motion", lattice.total(),
+                         [=] RINGLET_LAMBDA(std::int32_t k) { nodes[k] = mean_of(sums[k]); });
+    // Nodes without hair take their neighbours' motion, as far away from hair as it goes.
+    for (int sweep = 0; sweep < kLatticeCells; ++sweep) {
+      const MotionNode* from = nodes_.data();
+      MotionNode* to = filled_.data();
+      backend.parallel_for("fill motion", lattice.total(), [=] RINGLET_LAMBDA(std::int32_t k) {
+        to[k] = from[k].known ? from[k] : mean_of_neighbours(lattice, from, k);
+      });
+      nodes_.swap(filled_);
+    }
   }
 
   void find_boxes(Backend& backend, const HairPlaces<T>& places, const std::int32_t* strand,
@@ -91,32 +116,42 @@ class Neighbours {
     box_.resize(particles);
     Box* boxes = box_.data();
     const MotionLattice lattice = lattice_;
-    const MotionSum* sums = sums_.data();
+    const MotionNode* nodes = nodes_.data();
     backend.parallel_for("contact boxes", particles, [=] RINGLET_LAMBDA(std::int32_t p) {
-      if (strand[p] < 0) return;
-      const Place<T>* ends[2] = {&places.end[p], &places.end[p + kLanes]};
-      const Place<T>* starts[2] = {&places.start[p], &places.start[p + kLanes]};
-      float middle[3];
-      for (int c = 0; c < 3; ++c)
-        middle[c] = static_cast<float>(T(0.5) * ((&ends[0]->x)[c] + (&ends[1]->x)[c]));
-      const MeanMotion motion = mean_motion(lattice, sums, middle);
-      Box box;
-      for (int c = 0; c < 3; ++c) {
-        box.low[c] = 3e38f, box.high[c] = -3e38f;
-        for (int k = 0; k < 2; ++k) {
-          const float end = static_cast<float>((&ends[k]->x)[c]),
-                      start = static_cast<float>((&starts[k]->x)[c]) + motion.mean[c];
-          box.low[c] = min(box.low[c], min(start, end)), box.high[c] = max(box.high[c], max(start, end));
-        }
-      }
-      // Neighbours are moved along with the mean motion where they are.
-      const float half = box.half_size();
-      for (int c = 0; c < 3; ++c) {
-        const float more = fma(motion.spread[c], half, 0.5f * margin);
-        box.low[c] -= more, box.high[c] += more;
-      }
-      boxes[p] = box;
+      if (strand[p] >= 0) boxes[p] = swept_box(places, p, lattice, nodes, margin);
     });
+  }
+
+  // Holds the segment's places at the end, and at the start moved along with the mean motion.
+  RINGLET_FUNCTION static Box swept_box(const HairPlaces<T>& places, std::int32_t p,
+                                        const MotionLattice& lattice, const MotionNode* nodes, float margin) {
+    const auto vector = [](const Place<T>& at) {
+      return Vector3<float>{static_cast<float>(at.x), static_cast<float>(at.y), static_cast<float>(at.z)};
+    };
+    const Segment<float> end{vector(places.end[p]), vector(places.end[p + kLanes])},
+        start{vector(places.start[p]), vector(places.start[p + kLanes])};
+    const auto pieces = static_cast<int>(min(length(end.along()) * lattice.per_cell, 64.0f)) + 1;
+    Box box{{3e38f, 3e38f, 3e38f}, {-3e38f, -3e38f, -3e38f}};
+    float spread[3] = {};
+    for (int k = 0; k <= pieces; ++k) {
+      const float s = static_cast<float>(k) / static_cast<float>(pieces);
+      const Vector3<float> now = end.at(s), then = start.at(s);
+      const float last[3] = {now.x, now.y, now.z}, first[3] = {then.x, then.y, then.z};
+      const MeanMotion motion = mean_motion(lattice, nodes, last);
+      for (int c = 0; c < 3; ++c) {
+        const float moved = first[c] + motion.mean[c];
+        box.low[c] = min(box.low[c], min(moved, last[c]));
+        box.high[c] = max(box.high[c], max(moved, last[c]));
+        spread[c] = max(spread[c], motion.spread[c]);
+      }
+    }
+    // Neighbours are moved along with the mean motion where they are.
+    const float half = box.half_size();
+    for (int c = 0; c < 3; ++c) {
+      const float more = fma(kSpreadShare * spread[c], half, 0.5f * margin);
+      box.low[c] -= more, box.high[c] += more;
+    }
+    return box;
   }
 
   void fill_table(Backend& backend, const HairPlaces<T>& places, const std::int32_t* strand,
@@ -250,6 +285,7 @@ class Neighbours {
   BoxTable table_{};
   std::int32_t groups_ = 0;
   Buffer<MotionSum> sums_;
+  Buffer<MotionNode> nodes_, filled_;
   Buffer<Box> box_;
   Buffer<std::uint64_t> key_;
   Buffer<std::uint32_t> order_;

@@ -203,12 +203,16 @@ RINGLET_FUNCTION PairContact<R> find_contact(const SegmentPair<R>& pair, R reach
   const ClosestPlaces<R> at = closest_places(products);
   const Vector3<R> apart = pair.a.at(at.s) - pair.b.at(at.u);
   contact.s = at.s, contact.u = at.u, contact.later = R(1);
-  const R distance = length(apart);
-  contact.normal = inverse_or_zero(distance, R(Scalar<R>(1e-12))) * apart;
-  contact.distance = distance;
+  contact.distance = length(apart);
   contact.crossed = R(0) > R(1);
-
   const Mask<R> changed = differ_in_sign(first, last);
+  // Between the insides of two segments that stay on their sides, the normal is known however near they are.
+  const Mask<R> inside = (R(0) < at.s) & (at.s < R(1)) & (R(0) < at.u) & (at.u < R(1)) & !changed;
+  const R per_sine = inverse_or_zero(sqrt(products.determinant), R(Scalar<R>(1e-18)));
+  contact.normal =
+      select(inside, select(first < R(0), per_sine, -per_sine) * cross(pair.a.along(), pair.b.along()),
+             inverse_or_zero(contact.distance, R(Scalar<R>(1e-12))) * apart);
+
   if (any(changed & !parallel)) {
     const PairContact<R> crossing = crossing_contact(pair, first);
     contact.crossed = crossing.crossed & changed & !parallel;

@@ -1,12 +1,10 @@
 // Two segments: closest points, crossings and their times against brute force in double.
 #include <gtest/gtest.h>
 
-#include <Eigen/Dense>
-#include <algorithm>
-#include <array>
 #include <random>
 
 #include "kernels/contact/segment_pair.h"
+#include "oracle/segment_crossings.h"
 
 namespace ringlet::kernels_testing {
 namespace {
@@ -15,11 +13,8 @@ using kernels::PairContact;
 using kernels::SegmentPair;
 using Vec3 = Eigen::Vector3d;
 
-// a's begin and end, b's begin and end.
-using Ends = std::array<Vec3, 4>;
-struct Motion {
-  Ends start, end;
-};
+using Ends = oracle::SegmentEnds;
+using Motion = oracle::SegmentMotion;
 
 template <class T>
 SegmentPair<T> as_pair(const Motion& motion) {
@@ -40,59 +35,7 @@ Vec3 normal_of(const PairContact<T>& contact) {
   return {contact.normal.x, contact.normal.y, contact.normal.z};
 }
 
-// Where the motion is after a share t of it.
-Ends between(const Motion& motion, double t) {
-  Ends ends;
-  for (int k = 0; k < 4; ++k) ends[k] = motion.start[k] + t * (motion.end[k] - motion.start[k]);
-  return ends;
-}
-
-double point_to_segment(const Vec3& p, const Vec3& begin, const Vec3& end) {
-  const Vec3 along = end - begin;
-  const double length2 = along.squaredNorm();
-  const double s = length2 > 0 ? std::clamp(along.dot(p - begin) / length2, 0.0, 1.0) : 0;
-  return (begin + s * along - p).norm();
-}
-
-// The distance of two segments: between their insides where the lines' closest points are, or from an end.
-double brute_distance(const Ends& e) {
-  double best = std::min({point_to_segment(e[0], e[2], e[3]), point_to_segment(e[1], e[2], e[3]),
-                          point_to_segment(e[2], e[0], e[1]), point_to_segment(e[3], e[0], e[1])});
-  Eigen::Matrix<double, 3, 2> lines;
-  lines << e[1] - e[0], e[2] - e[3];
-  const Eigen::Vector2d at = lines.colPivHouseholderQr().solve(e[2] - e[0]);
-  if ((at.array() >= 0).all() && (at.array() <= 1).all())
-    best = std::min(best, (lines * at - (e[2] - e[0])).norm());
-  return best;
-}
-
-// How many times segments have passed through one another, by small steps: sign changes of the volume while
-// the lines' closest points are within both segments. `clear` turns false where an end decides.
-struct BruteCrossings {
-  int count = 0;
-  double last = 0;  // when
-  bool clear = true;
-};
-BruteCrossings brute_crossings(const Motion& motion) {
-  constexpr int kSteps = 4000;
-  BruteCrossings found;
-  const auto volume = [](const Ends& e) { return (e[2] - e[0]).dot((e[1] - e[0]).cross(e[3] - e[2])); };
-  double before = volume(motion.start);
-  for (int k = 1; k <= kSteps; ++k) {
-    const Ends e = between(motion, static_cast<double>(k) / kSteps);
-    const double now = volume(e);
-    if ((now < 0) != (before < 0)) {
-      Eigen::Matrix<double, 3, 2> lines;
-      lines << e[1] - e[0], e[2] - e[3];
-      const Eigen::Vector2d at = lines.colPivHouseholderQr().solve(e[2] - e[0]);
-      const double inside = std::min(at.minCoeff(), 1 - at.maxCoeff());
-      if (std::abs(inside) < 0.02) found.clear = false;
-      if (inside > 0) ++found.count, found.last = (k - 0.5) / kSteps;
-    }
-    before = now;
-  }
-  return found;
-}
+constexpr int kSteps = 4000;
 
 class Random {
  public:
@@ -125,7 +68,7 @@ TYPED_TEST(ContactPair, FindsTheDistanceOfSegmentsInAnyPlace) {
     if (k % 20 == 4) e[1] = e[0], e[3] = e[2];                                        // two points
     if (k % 20 == 9) e[2] = e[1] + random.vector(1e-6), e[3] = e[2] + (e[1] - e[0]);  // end to end
     const auto contact = contact_of<TypeParam>({e, e});
-    const double brute = brute_distance(e);
+    const double brute = oracle::segment_distance(e);
     EXPECT_FALSE(contact.crossed) << k;  // nothing moved
     EXPECT_NEAR(contact.distance, brute, this->kTolerance) << k;
     EXPECT_TRUE(contact.s >= 0 && contact.s <= 1 && contact.u >= 0 && contact.u <= 1) << k;
@@ -144,11 +87,11 @@ TYPED_TEST(ContactPair, SeesEveryCrossingAndNoOther) {
     // Of neighbours that move by about their distance.
     Motion motion{random.ends(0.01), {}};
     for (int end = 0; end < 4; ++end) motion.end[end] = motion.start[end] + random.vector(0.008);
-    const BruteCrossings brute = brute_crossings(motion);
+    const oracle::SegmentCrossings brute = oracle::segment_crossings(motion, kSteps);
     if (!brute.clear) continue;
     const auto contact = contact_of<TypeParam>(motion);
-    const auto volume = [](const Ends& e) { return (e[2] - e[0]).dot((e[1] - e[0]).cross(e[3] - e[2])); };
-    const bool turned = (volume(motion.start) < 0) != (volume(motion.end) < 0);
+    const bool turned =
+        (oracle::tetrahedron_volume(motion.start) < 0) != (oracle::tetrahedron_volume(motion.end) < 0);
     if (brute.count == 1 && turned) ++crossed, seen += contact.crossed;
     // A crossing and a return is none, and so is one that was undone round a tip.
     if (brute.count == 0 || !turned) {
@@ -158,7 +101,7 @@ TYPED_TEST(ContactPair, SeesEveryCrossingAndNoOther) {
     if (!contact.crossed || brute.count != 1) continue;
     EXPECT_NEAR(contact.later, 1 - brute.last, 2e-3) << k;
     // The normal is the common perpendicular of that time, on a's side of the start.
-    const Ends e = between(motion, 1 - contact.later);
+    const Ends e = motion.after(1 - contact.later);
     const Vec3 normal = normal_of(contact);
     EXPECT_NEAR(normal.norm(), 1, 1e-5) << k;
     EXPECT_NEAR(normal.dot((e[1] - e[0]).normalized()), 0, 1e-3) << k;
@@ -187,7 +130,7 @@ TYPED_TEST(ContactPair, DoesNotMindWhatMovesBothAlike) {
   for (int k = 0; k < 500; ++k) {
     Motion motion{random.ends(0.01), {}};
     for (int end = 0; end < 4; ++end) motion.end[end] = motion.start[end] + random.vector(0.008);
-    if (!brute_crossings(motion).clear) continue;
+    if (!oracle::segment_crossings(motion, kSteps).clear) continue;
     Motion carried = motion;
     const Eigen::Matrix3d turn =
         Eigen::AngleAxisd(0.5 * random.symmetric(), random.vector(1).normalized()).toRotationMatrix();
@@ -208,7 +151,7 @@ TYPED_TEST(ContactPair, IsTheSameFromBothSides) {
   for (int k = 0; k < 500; ++k) {
     Motion motion{random.ends(0.01), {}};
     for (int end = 0; end < 4; ++end) motion.end[end] = motion.start[end] + random.vector(0.008);
-    if (!brute_crossings(motion).clear) continue;
+    if (!oracle::segment_crossings(motion, kSteps).clear) continue;
     Motion other;
     for (int end = 0; end < 4; ++end)
       other.start[end] = motion.start[(end + 2) % 4], other.end[end] = motion.end[(end + 2) % 4];

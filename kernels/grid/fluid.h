@@ -165,11 +165,11 @@ RINGLET_FUNCTION T pressed(const GridData<T>& g, const double* pressure, std::in
   return lightness * static_cast<T>(at(next_node(g, node, axis, -1)) - at(node));
 }
 
-// Readies a tile's nodes for the way back: the change of velocity and the share `pic` of the velocity itself
-// take the place of masses, no displacement that of velocities.
+// Readies a tile's nodes for the way back (`pressure` null: of places alone): the change of velocity and the
+// share `pic` of the velocity itself take the place of masses, no displacement that of velocities.
 template <class T>
 RINGLET_FUNCTION void press_velocities(const GridData<T>& g, const double* pressure, std::int32_t tile) {
-  const bool fluid = has_fluid_faces(g, tile);
+  const bool fluid = pressure && has_fluid_faces(g, tile);
   for (int cell = 0; cell < kTileCells; ++cell) {
     const std::int64_t node = static_cast<std::int64_t>(tile) * kTileCells + cell;
     T* values = g.node + node * kNodeValues + kFaceMass;

@@ -42,15 +42,23 @@ class GridSolver final : public HairGrid<T> {
     GridFigures figures;
     data_.step = step;
     if (data_.particles == 0) return figures;
-    fill();
-    find_fluid();
-    find_walls();
-    figures.cells = data_.cells;
-    figures.density = densest();
-    if (data_.cells > 0) assemble();
-    keep_volume(figures);
-    if (figures.density > 1 + kOverDense) move_apart(figures);
-    give_back_all(figures.moved);
+    for (int pass = 0; pass < step.passes; ++pass) {
+      fill();
+      find_fluid();
+      find_walls();
+      const double density = densest();
+      if (pass == 0) figures.cells = data_.cells, figures.density = density;
+      const bool dense = density > 1 + kOverDense;
+      if (pass > 0 && !dense) break;
+      assemble();
+      if (pass == 0)
+        keep_volume(figures);
+      else
+        leave_velocities();
+      if (dense) move_apart(figures);
+      give_back_all(dense);
+      figures.moved = figures.moved || dense;
+    }
     return figures;
   }
 
@@ -400,6 +408,7 @@ class GridSolver final : public HairGrid<T> {
 
   // The operator, and by how much each cell would be compressed in the interval beyond what it may.
   void assemble() {
+    if (data_.cells == 0) return;
     backend_.parallel_for(
         "grid: lightness", data_.tiles,
         [g = data_] RINGLET_LAMBDA(int tile) {
@@ -448,7 +457,12 @@ class GridSolver final : public HairGrid<T> {
   // Velocities that the pressure changes, and friction among neighbours.
   void keep_volume(GridFigures& figures) {
     if (data_.cells > 0) solve(figures);
-    const double* pressure = pressure_.pressure.data();
+    press(data_.step.pic, pressure_.pressure.data());
+  }
+  void leave_velocities() { press(T(0), nullptr); }
+
+  void press(T pic, const double* pressure) {
+    data_.step.pic = pic;
     backend_.parallel_for(
         "grid: press", data_.tiles,
         [g = data_, pressure] RINGLET_LAMBDA(int tile) { press_velocities(g, pressure, tile); }, kTileChunk);
@@ -471,7 +485,6 @@ class GridSolver final : public HairGrid<T> {
     backend_.parallel_for(
         "grid: press", data_.tiles,
         [g = data_, pressure] RINGLET_LAMBDA(int tile) { press_places(g, pressure, tile); }, kTileChunk);
-    figures.moved = true;
   }
 
   void solve(GridFigures& figures) {

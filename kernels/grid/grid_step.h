@@ -50,6 +50,7 @@ struct GridStep {
   T pic;            // share of PIC in what strands are given back
   double residual;  // relative, of the pressure
   std::int32_t most_iterations;
+  std::int32_t passes;   // over positions, until none is too dense
   std::int32_t clamped;  // prescribed particles at each root
   const SolidView* solids;
   std::int32_t solid_count;

@@ -268,8 +268,9 @@ class Builder {
     HairHair hair_hair;
     if (block.contains("grid")) {
       const Json& grid = block["grid"];
-      hair_hair.grid = {grid["resolution"],       grid["pic"], grid["residual"], grid["max_iterations"],
-                        cadence(grid["cadence"]), {}};
+      hair_hair.grid = {
+          grid["resolution"],       grid["pic"], grid["residual"], grid["max_iterations"], grid["passes"],
+          cadence(grid["cadence"]), {}};
       if (grid.contains("shelter")) hair_hair.grid->shelter = grid["shelter"]["strength"].get<double>();
     }
     if (block.contains("contacts")) {

@@ -229,6 +229,7 @@ struct HairGrid {
   double pic;       // share of the grid's own velocity that hair takes [-]
   double residual;  // of the pressure, relative to the right hand side [-]
   int max_iterations;
+  int passes;  // over positions, until no cell is denser than it may
   Cadence cadence;
   std::optional<double> shelter;  // the wind's loss in hair: factor of Beer and Lambert's exponent [-]
 };

@@ -175,6 +175,7 @@ TEST_F(SceneLoad, ReadsHairAgainstHair) {
   EXPECT_EQ(h.grid->pic, 0.1);
   EXPECT_EQ(h.grid->residual, 1e-3);
   EXPECT_EQ(h.grid->max_iterations, 50);
+  EXPECT_EQ(h.grid->passes, 3);
   EXPECT_EQ(h.grid->cadence, Cadence::kSubstep);
   EXPECT_EQ(h.grid->shelter, 0.5);
   EXPECT_EQ(h.contacts->friction, 0.2);

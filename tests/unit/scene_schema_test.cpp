@@ -188,6 +188,7 @@ TEST_F(SceneSchema, FillsInExactlyTheSchemasDefaults) {
       {defs + "hair_grid/properties/residual", "/effects/hair_hair/grid/residual", grid.residual},
       {defs + "hair_grid/properties/max_iterations", "/effects/hair_hair/grid/max_iterations",
        grid.max_iterations},
+      {defs + "hair_grid/properties/passes", "/effects/hair_hair/grid/passes", grid.passes},
       {defs + "hair_grid/properties/cadence", "/effects/hair_hair/grid/cadence",
        word(is(grid.cadence, Cadence::kFrame), "frame")},
       {defs + "hair_grid/properties/shelter/properties/strength", "/effects/hair_hair/grid/shelter/strength",

@@ -116,7 +116,7 @@ class SceneTest : public testing::Test {
           "linear_density": 1e-5, "shelter": {"strength": 0.5, "wake": 30}
         },
         "hair_hair": {
-          "grid": {"resolution": 64, "pic": 0.1, "residual": 1e-3, "max_iterations": 50, "cadence": "substep",
+          "grid": {"resolution": 64, "pic": 0.1, "residual": 1e-3, "max_iterations": 50, "passes": 3, "cadence": "substep",
                    "shelter": {"strength": 0.5}},
           "contacts": {"friction": 0.2, "passes": 2, "cadence": "substep", "radius": 0.05}
         },

@@ -85,6 +85,7 @@ class GridStage : public Stage<T> {
     step.pic = static_cast<T>(1 - std::pow(1 - options_.pic, 1.0 / runs));
     step.residual = options_.residual;
     step.most_iterations = options_.max_iterations;
+    step.passes = options_.passes;
     step.clamped = scene_.model.clamped_particles;
     step.solids = views_.data();
     step.solid_count = static_cast<std::int32_t>(views_.size());

@@ -198,6 +198,20 @@ def test_a_scene_that_moves_with_all_that_is_in_it_moves_as_the_still_one(progra
         assert np.abs(positions(moved, frame) - shift - positions(still, frame)).max() < 1e-4 * SIZE, frame + 1
 
 
+def test_hair_shelters_hair_from_the_wind(program, scene, tmp_path):
+    def blown(name, grid):
+        options = hair_hair({"grid": {**GRID["grid"], **grid}}) + setting("/effects/wind", {"velocity": [4, 0, 1]})
+        return finish(program, scene, tmp_path / name, *options)
+
+    still = positions(finish(program, scene, tmp_path / "still", *hair_hair(GRID)))
+    unsheltered = blown("none", {})
+    assert frame_bytes(blown("zero", {"shelter": {"strength": 0}})) == frame_bytes(unsheltered)
+    moved = [np.abs(positions(unsheltered) - still).mean()]
+    for strength in (1, 10, 1000):
+        moved.append(np.abs(positions(blown(str(strength), {"shelter": {"strength": strength}})) - still).mean())
+    assert moved == sorted(moved, reverse=True) and moved[-1] < 0.7 * moved[0], moved
+
+
 def test_a_squeezed_bundle_keeps_its_volume(program, source, tmp_path):
     """A hand closes on it within a second, to the room of its rest volume, and holds it two more."""
     scene = source / "scenes/hair_hair/squeezed_bundle.json"

@@ -33,7 +33,7 @@ struct FrameReport {
   // largest.
   double grid_solves = 0, grid_iterations = 0;  // of the pressure
   double grid_residual = 0;                     // that was left, relative to the right hand side [-]
-  double grid_density = 0;                      // largest at the frame's end, over its target [-]
+  double grid_density = 0;  // largest over its target before the frame's last correction [-]
   double grid_cells = 0;                        // fluid cells of the largest solve
   double contact_pairs = 0;                     // segments that were looked at, two by two
   double contacts = 0;                          // those that touched

@@ -80,7 +80,7 @@ class GridHair {
     state::pose_at_rest<T>(state, model, roots);
     step.axes = still_axes(cell);
     step.interval = step.substep = kInterval;
-    step.pic = T(0), step.residual = 1e-4, step.most_iterations = 200, step.clamped = 0;
+    step.pic = T(0), step.residual = 1e-4, step.most_iterations = 200, step.passes = 1, step.clamped = 0;
     grid_->at_rest(told());
   }
 

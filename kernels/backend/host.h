@@ -161,7 +161,7 @@ class Host {
   }
 
  private:
-  static constexpr int kDigitBits = 8, kDigits = 1 << kDigitBits, kSortChunk = 1 << 15, kSumLanes = 16;
+  static constexpr int kDigitBits = 11, kDigits = 1 << kDigitBits, kSortChunk = 1 << 15, kSumLanes = 16;
 
   static int chunks_of(int n, int chunk) { return n <= 0 ? 0 : (n - 1) / chunk + 1; }
 

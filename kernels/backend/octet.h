@@ -84,6 +84,18 @@ RINGLET_KERNEL Octet<T> positive(const Octet<T>& a) {
   return result;
 }
 
+template <class T, class I>
+RINGLET_KERNEL Octet<T> to_real(const Octet<I>& a) {
+  Octet<T> result;
+#if defined(__CUDACC__)
+  RINGLET_UNROLL
+  for (int k = 0; k < 8; ++k) result.v[k] = static_cast<T>(a.v[k]);
+#else
+  result.v = __builtin_convertvector(a.v, typename Octet<T>::Vector);
+#endif
+  return result;
+}
+
 // The nearest integers, halves to the even one.
 RINGLET_KERNEL Octet<std::int32_t> nearest(const Octet<float>& a) {
   Octet<std::int32_t> result;

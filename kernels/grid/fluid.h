@@ -173,6 +173,7 @@ RINGLET_FUNCTION void press_velocities(const GridData<T>& g, const double* press
   for (int cell = 0; cell < kTileCells; ++cell) {
     const std::int64_t node = static_cast<std::int64_t>(tile) * kTileCells + cell;
     T* values = g.node + node * kNodeValues + kFaceMass;
+    if (!(values[0] > T(0) || values[2] > T(0) || values[4] > T(0))) continue;  // no hair, nothing to read
     for (int axis = 0; axis < 3; ++axis) {
       const T change = fluid ? pressed(g, pressure, node, axis) : T(0);
       values[2 * axis] = fma(g.step.pic, values[2 * axis + 1], change), values[2 * axis + 1] = T(0);

@@ -316,11 +316,7 @@ class GridSolver final : public HairGrid<T> {
           },
           2 * kTileChunk);
     backend_.parallel_for(
-        "grid: nodes", data_.tiles,
-        [g = data_] RINGLET_LAMBDA(int tile) {
-          for (int cell = 0; cell < kTileCells; ++cell)
-            finish_node(g, static_cast<std::int64_t>(tile) * kTileCells + cell);
-        },
+        "grid: nodes", data_.tiles, [g = data_] RINGLET_LAMBDA(int tile) { finish_tile(g, tile); },
         kTileChunk);
   }
 

@@ -286,15 +286,25 @@ RINGLET_FUNCTION void scatter_tile(const GridData<T>& g, std::int32_t occupied) 
   });
 }
 
-// Density, target, masses and velocities of a node from its sums.
+// Density, target, masses and velocities of a tile's nodes from their sums. Most nodes of most tiles have no
+// hair.
 template <class T>
-RINGLET_FUNCTION void finish_node(const GridData<T>& g, std::int64_t node) {
-  const Fixed<T>* sums = g.sums + node * kNodeValues;
-  T* to = g.node + node * kNodeValues;
-  const auto value = [&](int v) { return static_cast<T>(sums[v]) / g.scale[v]; };
-  const auto over = [](T a, T b) { return select(b > T(0), a, T(0)) / select(b > T(0), b, T(1)); };
-  to[kDensity] = value(kDensity), to[kTarget] = over(value(kTarget), to[kDensity]);
-  for (int v = kFaceMass; v < kNodeValues; v += 2) to[v] = value(v), to[v + 1] = over(value(v + 1), to[v]);
+RINGLET_FUNCTION void finish_tile(const GridData<T>& g, std::int32_t tile) {
+  Octet<T> unit;
+  for (int v = 0; v < kNodeValues; ++v) unit.v[v] = T(1) / g.scale[v];
+  const auto over = [](T a, T b) { return b > T(0) ? a / b : T(0); };
+  for (int cell = 0; cell < kTileCells; ++cell) {
+    const std::int64_t at = (static_cast<std::int64_t>(tile) * kTileCells + cell) * kNodeValues;
+    Fixed<T> hair = 0;
+    for (int v = 0; v < kNodeValues; ++v) hair |= g.sums[at + v];
+    Octet<T> value(T(0));
+    if (hair != 0) {
+      value = to_real<T>(Octet<Fixed<T>>::load(g.sums + at)) * unit;
+      value.v[kTarget] = over(value.v[kTarget], value.v[kDensity]);
+      for (int v = kFaceMass; v < kNodeValues; v += 2) value.v[v + 1] = over(value.v[v + 1], value.v[v]);
+    }
+    value.store(g.node + at);
+  }
 }
 
 // ---- Back to the strands

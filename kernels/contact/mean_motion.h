@@ -2,7 +2,9 @@
 //
 // Locks of hair travel centimetres in a frame, neighbours against one another millimetres. Neighbours are
 // looked for along what is left of a segment's way without the mean motion, so that hair that moves together
-// costs no more than hair at rest. Sums are of whole numbers: in any order the same.
+// costs no more than hair at rest. Two segments that meet are each moved by the mean motion where they are at
+// the end; the field is made so smooth that this is nearly the same, and the difference is known to be less
+// than its slope times their distance. Sums are of whole numbers: in any order the same.
 #pragma once
 #include "kernels/contact/contact_data.h"
 
@@ -42,24 +44,53 @@ RINGLET_KERNEL MotionNode mean_of(const MotionSum& sum) {
   return node;
 }
 
-RINGLET_FUNCTION MotionNode mean_of_neighbours(const MotionLattice& lattice, const MotionNode* nodes,
-                                               std::int32_t node) {
+// Calls visit(neighbour's number) for the nodes next to one.
+template <class Visit>
+RINGLET_KERNEL void for_neighbours(const MotionLattice& lattice, std::int32_t node, const Visit& visit) {
   const std::int32_t at[3] = {node % lattice.nodes[0], node / lattice.nodes[0] % lattice.nodes[1],
                               node / (lattice.nodes[0] * lattice.nodes[1])};
   const std::int32_t stride[3] = {1, lattice.nodes[0], lattice.nodes[0] * lattice.nodes[1]};
+  for (int axis = 0; axis < 3; ++axis) {
+    if (at[axis] > 0) visit(node - stride[axis]);
+    if (at[axis] + 1 < lattice.nodes[axis]) visit(node + stride[axis]);
+  }
+}
+
+// What a node without hair takes on.
+RINGLET_FUNCTION MotionNode mean_of_neighbours(const MotionLattice& lattice, const MotionNode* nodes,
+                                               std::int32_t node) {
   MotionNode mean{};
   float count = 0;
-  for (int axis = 0; axis < 3; ++axis)
-    for (int side = -1; side <= 1; side += 2) {
-      if (at[axis] + side < 0 || at[axis] + side >= lattice.nodes[axis]) continue;
-      const MotionNode& other = nodes[node + side * stride[axis]];
-      if (!other.known) continue;
-      for (int c = 0; c < 3; ++c) mean.mean[c] += other.mean[c];
-      count += 1;
-    }
+  for_neighbours(lattice, node, [&](std::int32_t other) {
+    if (!nodes[other].known) return;
+    for (int c = 0; c < 3; ++c) mean.mean[c] += nodes[other].mean[c];
+    count += 1;
+  });
   mean.known = count > 0;
   for (int c = 0; c < 3 && mean.known; ++c) mean.mean[c] /= count;
   return mean;
+}
+
+// The node moved towards those neighbours that it differs from by more than `most`.
+RINGLET_FUNCTION MotionNode less_steep(const MotionLattice& lattice, const MotionNode* nodes,
+                                       std::int32_t node, float most) {
+  MotionNode moved = nodes[node];
+  for_neighbours(lattice, node, [&](std::int32_t other) {
+    for (int c = 0; c < 3; ++c) {
+      const float apart = nodes[other].mean[c] - nodes[node].mean[c];
+      moved.mean[c] += (apart - max(-most, min(most, apart))) / 6;
+    }
+  });
+  return moved;
+}
+
+// The largest difference to a neighbour.
+RINGLET_FUNCTION float steepness(const MotionLattice& lattice, const MotionNode* nodes, std::int32_t node) {
+  float most = 0;
+  for_neighbours(lattice, node, [&](std::int32_t other) {
+    for (int c = 0; c < 3; ++c) most = max(most, abs(nodes[other].mean[c] - nodes[node].mean[c]));
+  });
+  return most;
 }
 
 struct MeanMotion {

@@ -22,7 +22,7 @@ class Neighbours {
     find_mean_motion(backend, places, strand, particles);
     find_boxes(backend, places, strand, particles, box_margin);
     fill_table(backend, places, strand, particles);
-    search(backend, places, reach, box_margin);
+    search(backend, places, strand, particles, reach, box_margin);
     return gather_pairs(backend);
   }
 
@@ -37,8 +37,9 @@ class Neighbours {
  private:
   // What counts as near, in sums of radii: about as far as contacts move hair in an application.
   static constexpr double kMarginReaches = 4;
-  static constexpr int kLatticeCells = 8;  // of the mean motion, along the longest axis
-  static constexpr float kSpreadShare = 1;
+  static constexpr int kLatticeCells = 8;   // of the mean motion, along the longest axis
+  static constexpr float kSteepest = 0.3f;  // slope of the mean motion that is aimed at [-]
+  static constexpr int kSmoothings = 48;
 
   // Lowest and highest of f(particle)[axis] over particles with a segment.
   template <class Values>
@@ -56,22 +57,15 @@ class Neighbours {
     }
   }
 
-  // Nodes far enough apart that neighbours are between the same ones at both times, however they have moved
-  // against one another: then the mean motion is the same for both, but for its slope.
   void make_lattice(Backend& backend, const HairPlaces<T>& places, const std::int32_t* strand,
                     std::int32_t particles) {
-    float high[3], slowest[3], fastest[3];
+    float high[3];
     find_bounds(
         backend, strand, particles,
         [=] RINGLET_LAMBDA(std::int32_t p, int c) { return (&places.end[p].x)[c]; }, lattice_.low, high);
-    find_bounds(
-        backend, strand, particles,
-        [=] RINGLET_LAMBDA(std::int32_t p, int c) { return (&places.end[p].x)[c] - (&places.start[p].x)[c]; },
-        slowest, fastest);
-    float size = 1e-3f, apart = 0;
-    for (int c = 0; c < 3; ++c)
-      size = max(size, high[c] - lattice_.low[c]), apart = max(apart, fastest[c] - slowest[c]);
-    lattice_.per_cell = 1 / max(size / static_cast<float>(kLatticeCells), 0.5f * apart);
+    float size = 1e-3f;
+    for (int c = 0; c < 3; ++c) size = max(size, high[c] - lattice_.low[c]);
+    lattice_.per_cell = static_cast<float>(kLatticeCells) / size;
     for (int c = 0; c < 3; ++c)
       lattice_.nodes[c] = static_cast<std::int32_t>((high[c] - lattice_.low[c]) * lattice_.per_cell) + 2;
   }
@@ -100,15 +94,27 @@ class Neighbours {
     MotionNode* nodes = nodes_.data();
     backend.parallel_for("mean motion", lattice.total(),
                          [=] RINGLET_LAMBDA(std::int32_t k) { nodes[k] = mean_of(sums[k]); });
-    // Nodes without hair take their neighbours' motion, as far away from hair as it goes.
-    for (int sweep = 0; sweep < kLatticeCells; ++sweep) {
-      const MotionNode* from = nodes_.data();
-      MotionNode* to = filled_.data();
-      backend.parallel_for("fill motion", lattice.total(), [=] RINGLET_LAMBDA(std::int32_t k) {
-        to[k] = from[k].known ? from[k] : mean_of_neighbours(lattice, from, k);
-      });
-      nodes_.swap(filled_);
-    }
+    const auto sweep = [&](const char* name, int sweeps, const auto& change) {
+      for (int k = 0; k < sweeps; ++k) {
+        const MotionNode* from = nodes_.data();
+        MotionNode* to = filled_.data();
+        backend.parallel_for(name, lattice.total(),
+                             [=] RINGLET_LAMBDA(std::int32_t node) { to[node] = change(from, node); });
+        nodes_.swap(filled_);
+      }
+    };
+    sweep("fill motion", kLatticeCells, [=] RINGLET_LAMBDA(const MotionNode* from, std::int32_t node) {
+      return from[node].known ? from[node] : mean_of_neighbours(lattice, from, node);
+    });
+    const float most = kSteepest / lattice.per_cell;
+    sweep("smooth motion", kSmoothings, [=] RINGLET_LAMBDA(const MotionNode* from, std::int32_t node) {
+      return less_steep(lattice, from, node, most);
+    });
+    const MotionNode* smooth = nodes_.data();
+    const double left = backend.largest("steepness", lattice.total(), 0, [=] RINGLET_LAMBDA(std::int32_t k) {
+      return static_cast<double>(steepness(lattice, smooth, k));
+    });
+    slope_ = static_cast<float>(left) * lattice.per_cell;
   }
 
   void find_boxes(Backend& backend, const HairPlaces<T>& places, const std::int32_t* strand,
@@ -117,14 +123,16 @@ class Neighbours {
     Box* boxes = box_.data();
     const MotionLattice lattice = lattice_;
     const MotionNode* nodes = nodes_.data();
+    const float slope = min(slope_, 0.9f);
     backend.parallel_for("contact boxes", particles, [=] RINGLET_LAMBDA(std::int32_t p) {
-      if (strand[p] >= 0) boxes[p] = swept_box(places, p, lattice, nodes, margin);
+      if (strand[p] >= 0) boxes[p] = swept_box(places, p, lattice, nodes, slope, margin);
     });
   }
 
   // Holds the segment's places at the end, and at the start moved along with the mean motion.
   RINGLET_FUNCTION static Box swept_box(const HairPlaces<T>& places, std::int32_t p,
-                                        const MotionLattice& lattice, const MotionNode* nodes, float margin) {
+                                        const MotionLattice& lattice, const MotionNode* nodes, float slope,
+                                        float margin) {
     const auto vector = [](const Place<T>& at) {
       return Vector3<float>{static_cast<float>(at.x), static_cast<float>(at.y), static_cast<float>(at.z)};
     };
@@ -132,7 +140,7 @@ class Neighbours {
         start{vector(places.start[p]), vector(places.start[p + kLanes])};
     const auto pieces = static_cast<int>(min(length(end.along()) * lattice.per_cell, 64.0f)) + 1;
     Box box{{3e38f, 3e38f, 3e38f}, {-3e38f, -3e38f, -3e38f}};
-    float spread[3] = {};
+    float spread[3] = {}, apart = 0;
     for (int k = 0; k <= pieces; ++k) {
       const float s = static_cast<float>(k) / static_cast<float>(pieces);
       const Vector3<float> now = end.at(s), then = start.at(s);
@@ -142,13 +150,14 @@ class Neighbours {
         const float moved = first[c] + motion.mean[c];
         box.low[c] = min(box.low[c], min(moved, last[c]));
         box.high[c] = max(box.high[c], max(moved, last[c]));
-        spread[c] = max(spread[c], motion.spread[c]);
+        spread[c] = max(spread[c], motion.spread[c]), apart = max(apart, abs(moved - last[c]));
       }
     }
-    // Neighbours are moved along with the mean motion where they are.
-    const float half = box.half_size();
+    // A neighbour that it meets is as far away at the end as both have left the mean motion, and that much
+    // more as the mean motion differs between them; within their own lengths by the slope just here.
+    const float beyond = slope / (1 - slope) * apart, half = box.half_size();
     for (int c = 0; c < 3; ++c) {
-      const float more = fma(kSpreadShare * spread[c], half, 0.5f * margin);
+      const float more = min(spread[c], slope) * half + beyond + 0.5f * margin;
       box.low[c] -= more, box.high[c] += more;
     }
     return box;
@@ -233,7 +242,8 @@ class Neighbours {
   }
 
   // Again with more memory where the pool was too small.
-  void search(Backend& backend, const HairPlaces<T>& places, T reach, float box_margin) {
+  void search(Backend& backend, const HairPlaces<T>& places, const std::int32_t* strand,
+              std::int32_t particles, T reach, float box_margin) {
     groups_ = (table_.boxes + kGroupSegments - 1) / kGroupSegments;
     last_.resize(groups_), count_.resize(groups_ + 1), taken_.resize(1);
     std::int32_t needed = groups_ + groups_ / 2 + 1;
@@ -245,7 +255,7 @@ class Neighbours {
       backend.parallel_for("clear pool", 1, [=] RINGLET_LAMBDA(std::int32_t) { *taken = *end = 0; });
       const PairPool pool{pool_.data(), next_.data(), taken, static_cast<std::int32_t>(next_.size()),
                           last_.data(), count_.data()};
-      const PairSearch<F, R> work{table_, places, box_margin, margin_, reach, pool};
+      const PairSearch<F, R> work{table_, places, strand, particles, box_margin, margin_, reach, pool};
       backend.parallel_for("contact pairs", groups_, work, kSearchChunk);
       needed = static_cast<std::int32_t>(backend.largest(
           "pool", 1, 0, [=] RINGLET_LAMBDA(std::int32_t) { return static_cast<double>(*taken); }));
@@ -282,6 +292,7 @@ class Neighbours {
 
   T margin_ = T(0);
   MotionLattice lattice_{};
+  float slope_ = 0;  // of the mean motion, at most [-]
   BoxTable table_{};
   std::int32_t groups_ = 0;
   Buffer<MotionSum> sums_;

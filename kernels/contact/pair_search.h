@@ -42,6 +42,8 @@ struct PairSearch {
 
   BoxTable table;
   HairPlaces<T> places;
+  const std::int32_t* strand;  // [particles] of the segment that begins there
+  std::int32_t particles;
   float box_margin;  // boxes farther apart than this at both times, along an axis, are left out [m]
   T margin;          // as segments are that are farther apart at the end, of those that have not crossed [m]
   T reach;           // the largest sum of radii [m]
@@ -124,25 +126,48 @@ struct PairSearch {
     if (count == 0) return;
     for (int k = count; k % kPairs; ++k) suspects.a[k] = suspects.a[0], suspects.b[k] = suspects.b[0];
     for (int k = 0; k < count; k += kPairs) {
-      std::uint32_t found = lane_bits(is_pair(suspects.a + k, suspects.b + k));
+      const std::int32_t *a = suspects.a + k, *b = suspects.b + k;
+      const SegmentPair<R> pair = gather_pair<R>(places, a, b);
+      if (!any(may_touch(pair))) continue;
+      const PairContact<R> contact = find_contact(pair, R(reach));
+      std::uint32_t found = lane_bits(contact.crossed | (contact.distance < R(reach + margin)));
+      alignas(64) T beyond[kPairs];  // in segment lengths
+      const R shorter = min(length(pair.a.along()), length(pair.b.along()));
+      store(beyond, select(contact.crossed, -contact.distance, R(0)) * inverse_or_zero(shorter, R(T(1e-9))));
       if (count - k < kPairs) found &= ~(~0u << (count - k));
       for (; found; found &= found - 1) {
-        const int lane = k + __builtin_ctz(found);
-        writer.add({suspects.a[lane], suspects.b[lane]});
+        const int lane = __builtin_ctz(found);
+        writer.add({a[lane], b[lane]});
+        if (beyond[lane] > T(kFar)) add_around(a[lane], b[lane], beyond[lane], writer);
       }
     }
   }
 
-  RINGLET_KERNEL Mask<R> is_pair(const std::int32_t* a, const std::int32_t* b) const {
-    const SegmentPair<R> pair = gather_pair<R>(places, a, b);
+  // What went past another by more than this share of its length may come to meet it with another segment
+  // when it is put back: the next, or one farther on.
+  static constexpr double kFar = 0.25;
+  static constexpr std::int32_t kMostAround = 4;
+
+  // Not lines that are farther apart than is near, and on the same sides as before.
+  RINGLET_KERNEL Mask<R> may_touch(const SegmentPair<R>& pair) const {
     const R near = R(reach + margin);
     const R first = tetrahedron_volume(pair.a_start, pair.b_start), last = tetrahedron_volume(pair.a, pair.b);
     const Vector3<R> across = cross(pair.a.along(), pair.b.along());
-    // Lines that are farther apart than that, and on the same sides as before.
-    const Mask<R> possible = differ_in_sign(first, last) | !(near * near * dot(across, across) < last * last);
-    if (!any(possible)) return possible;
-    const PairContact<R> contact = find_contact(pair, R(reach));
-    return possible & (contact.crossed | (contact.distance < near));
+    return differ_in_sign(first, last) | !(near * near * dot(across, across) < last * last);
+  }
+
+  RINGLET_FUNCTION void add_around(std::int32_t a, std::int32_t b, T beyond, PairWriter& writer) const {
+    const std::int32_t around = 1 + static_cast<std::int32_t>(min(T(kFar) * beyond, T(kMostAround - 1)));
+    for (std::int32_t i = -around * kLanes; i <= around * kLanes; i += kLanes)
+      for (std::int32_t j = -around * kLanes; j <= around * kLanes; j += kLanes) {
+        const std::int32_t one = a + i, other = b + j;
+        if ((i == 0 && j == 0) || !same_strand(a, one) || !same_strand(b, other)) continue;
+        const bool first = comes_first(places.end, one, other);
+        writer.add({first ? one : other, first ? other : one});
+      }
+  }
+  RINGLET_KERNEL bool same_strand(std::int32_t segment, std::int32_t other) const {
+    return other >= 0 && other < particles && strand[other] == strand[segment];
   }
 };
 

@@ -88,12 +88,18 @@ class HairRun {
   // What the next application starts from.
   void remember() { start_ = state.position, start_roots_ = state.root_points; }
 
-  // `seconds`: that the way since `remember` took.
-  HairContactFigures collide(double seconds) {
+  // As the state now is.
+  const kernels::HairContactStep<T>& contact_step() {
     step.batches = model.view(), step.row_count = static_cast<std::int32_t>(model.layout.rows());
     step.state = state.view(), step.radius = radius_.data();
     step.start = start_.data(), step.start_root_points = start_roots_.data();
     step.root_points = state.root_points.data();
+    return step;
+  }
+
+  // `seconds`: that the way since `remember` took.
+  HairContactFigures collide(double seconds) {
+    contact_step();
     HairContactFigures found = contacts.begin(step);
     for (int pass = 0; pass < passes; ++pass) {
       contacts.pass(step, found);

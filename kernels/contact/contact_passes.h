@@ -118,10 +118,9 @@ struct WeighContacts {
     const R per_mass = inverse_or_zero(response(a, s) + response(b, u), R(T(1e-6)));
     const Vector3<R> speed = gather_segment<R>(velocity, a).at(s) - gather_segment<R>(velocity, b).at(u);
     const R mu(friction);
-    const R relaxed = R(T(kRelaxation)) * per_mass;
-    store3<R>(lanes[2], kWidth, contact_impulse(normal, -gap, slip, mu, relaxed));
+    store3<R>(lanes[2], kWidth, contact_impulse(normal, -gap, R(T(kRelaxation)), slip, mu, per_mass));
     store3<R>(lanes[5], kWidth,
-              contact_impulse(normal, -dot(normal, speed), across(normal, speed), mu, per_mass));
+              contact_impulse(normal, -dot(normal, speed), R(1), across(normal, speed), mu, per_mass));
     for (int lane = 0; lane < kWidth; ++lane) {
       ContactRecord<T>& record = pairs.record[first + lane];
       for (int c = 0; c < 3; ++c) record.normal[c] = lanes[2 + c][lane], record.slip[c] = lanes[5 + c][lane];

@@ -123,9 +123,11 @@ class Heap {
     for_particles([&](std::size_t s, int i) { sum += 0.5 * run_.velocity(s, i).squaredNorm(); });
     return sum / (kHairs * kParticles);
   }
-  double lowest() const {
+  double lowest() const {  // but for tips, which may hang in the bed's meshes
     double least = 1;
-    for_particles([&](std::size_t s, int i) { least = std::min(least, run_.position(s, i).y()); });
+    for_particles([&](std::size_t s, int i) {
+      if (i + 1 < kParticles) least = std::min(least, run_.position(s, i).y());
+    });
     return least;
   }
   // [hairs][kParticles], then those of the bed, two each.

@@ -51,7 +51,7 @@ struct Pressure {
     double* p = pressure.data();
     T* diagonal = multigrid.level[0].diagonal.data();
     backend.parallel_for("pressure: clear", n, [=] RINGLET_LAMBDA(int i) { p[i] = 0, diagonal[i] = T(0); });
-    changed_ = cells();  // there is no hierarchy yet
+    
     const double compressed = find_violation(backend);
     double left = compressed, along = 0;
     while (left > tolerance * tolerance * compressed && figures.iterations < most_iterations) {
@@ -101,8 +101,7 @@ struct Pressure {
       r[i] = select(in, v[i], T(0));
       return in == was ? 0.0 : 1.0;
     });
-    if (changed == 0) return false;
-    changed_ += changed;
+        if (changed == 0) return false;
     backend.parallel_for("pressure: links", a.cells, [=] RINGLET_LAMBDA(int i) {
       const bool in = a.diagonal[i] > T(0);
       RINGLET_UNROLL
@@ -111,8 +110,7 @@ struct Pressure {
         a.link[at] = select(in & (a.diagonal[a.neighbour[at]] > T(0)), c[at], T(0));
       }
     });
-    // A hierarchy that knows of nearly all the cells preconditions as well.
-    if (changed_ > kStale * a.cells) multigrid.galerkin(backend), changed_ = 0;
+        multigrid.galerkin(backend);
     return true;
   }
 
@@ -142,8 +140,7 @@ struct Pressure {
     return cut > 0 ? 0 : along;
   }
 
-  static constexpr double kStale = 0.01;
-  double changed_ = 0;  // cells since the coarser operators were made
+  
   Buffer<T> direction, image, violation;
 };
 

@@ -20,7 +20,7 @@ import numpy as np
 from strand_cache import StrandCache
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-SCENES = ROOT / "scenes" / "paper"
+SCENES = ROOT / "scenes" / "paper"  # of scenes that are named without a folder
 WORK = ROOT / "build" / "figures"
 PROGRAM = pathlib.Path(os.environ.get("RINGLET_PROGRAM", ROOT / "build/release/bin/ringlet"))
 DIVERGED = 4  # the program's exit code
@@ -33,9 +33,14 @@ class RunError(Exception):
 # ---- Scenes ------------------------------------------------------------------------------------------------------
 
 
+def scene_path(name):
+    """`wig` is scenes/paper/wig.json, `hair_hair/two_locks` is scenes/hair_hair/two_locks.json."""
+    return (ROOT / "scenes" if "/" in name else SCENES) / f"{name}.json"
+
+
 def read_scene(name):
-    """The scene scenes/paper/NAME.json as a dictionary."""
-    return json.loads((SCENES / f"{name}.json").read_text())
+    """The scene as a dictionary."""
+    return json.loads(scene_path(name).read_text())
 
 
 def grooms_of(scene):
@@ -57,10 +62,10 @@ def thinned(scene, share):
 
 
 def run_scene(scene, label, overrides=None, frames=None, work=WORK, options=()):
-    """Runs scenes/paper/SCENE.json with `overrides` ({pointer: value}) into work/LABEL and returns the Run. Divergence
-    is a result (Run.diverged_frame); any other failure raises RunError. `frames`: write only up to this one; `options`:
-    of the program, as they stand on its command line."""
-    path = SCENES / f"{scene}.json"
+    """Runs a scene with `overrides` ({pointer: value}) into work/LABEL and returns the Run. Divergence is a result
+    (Run.diverged_frame); any other failure raises RunError. `frames`: write only up to this one; `options`: of the
+    program, as they stand on its command line."""
+    path = scene_path(scene)
     settings = dict(overrides or {})
     if frames is not None:
         settings["/frames/last"] = frames
@@ -89,9 +94,23 @@ def _child_seconds():
     return usage.ru_utime + usage.ru_stime
 
 
+def named_files(path):
+    """The files that a scene names and that are there."""
+
+    def texts(value):
+        if isinstance(value, str):
+            yield value
+        elif isinstance(value, (dict, list)):
+            for each in value.values() if isinstance(value, dict) else value:
+                yield from texts(each)
+
+    names = {path.parent / text for text in texts(json.loads(path.read_text()))}
+    return sorted(name for name in names if name.is_file())
+
+
 def _stamp(path, settings):
-    """Changes with the program, the settings, and the contents of the scene and of the files beside it."""
-    files = [path, *sorted((SCENES / "assets").glob("*")), ROOT / "scenes/assets/head.obj"]
+    """Changes with the program, the settings, and the contents of the scene and of the files that it names."""
+    files = [path, *named_files(path)]
     state = [PROGRAM.stat().st_size, PROGRAM.stat().st_mtime_ns]
     state += [hashlib.sha256(file.read_bytes()).hexdigest() for file in files]
     return hashlib.sha256(json.dumps([state, settings], sort_keys=True).encode()).hexdigest()

@@ -1,5 +1,5 @@
-"""How dense hair is, from positions alone: the length of hair in cells of a lattice of our own, not the solver's, and the
-cells that hair is in."""
+"""How dense hair is, from positions alone: its length in the cells of a lattice of our own, not the solver's; and its
+volume, of the cells that it is in."""
 import numpy as np
 
 from .common import rigid_motion
@@ -25,7 +25,7 @@ def keys(cells):
 
 
 class Lattice:
-    """Density in strands a cell: the hair's length in it over its edge, each sample shared by its eight nearest cells."""
+    """Density in strands a cell: the hair's length in it over its edge, a sample shared by its eight nearest cells."""
 
     def __init__(self, run, position, cell):
         places, lengths = samples(run, position, 0.5 * cell)
@@ -49,8 +49,8 @@ class Lattice:
 
 
 def over_target(run, frames, resolution=128):
-    """{frame: (the largest density over its target, share of the hair that is over 1.5 times its target)} at the frame's
-    end. The target of a cell is the mean, over the hair in it, of the density that this hair had about it at rest."""
+    """{frame: (the largest density over its target, share of the hair over 1.5 times its target)} at the frame's end. The
+    target of a cell is the mean, over the hair in it, of the density that this hair had about it at rest."""
     rest = run.cache.rest_position.astype(float)
     cell = (rest.max(0) - rest.min(0)).max() / resolution
     allowed = np.maximum(LEAST, Lattice(run, rest, cell).about_samples())

@@ -55,7 +55,7 @@ def sections(axes, runs):
         hair = 1e3 * crossed(run, frame)
         ax.plot(hair[:, 0], hair[:, 2], ".", color="saddlebrown", markersize=1.5)
         ax.set_aspect("equal")
-        ax.set(xlim=(-27, 27), ylim=(-27, 27), title=title, xlabel="[mm]")
+        ax.set(xlim=(-34, 34), ylim=(-34, 34), title=title, xlabel="[mm]")
 
 
 def crossed(run, frame):

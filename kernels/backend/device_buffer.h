@@ -43,6 +43,9 @@ class DeviceBuffer {
     }
     size_ = size;
   }
+  void swap(DeviceBuffer& other) noexcept {
+    std::swap(data_, other.data_), std::swap(size_, other.size_), std::swap(capacity_, other.capacity_);
+  }
   // Done with `host` when it returns: pageable memory is staged.
   void upload(std::span<const T> host, cudaStream_t stream) {
     resize(host.size());
@@ -58,10 +61,6 @@ class DeviceBuffer {
   }
 
  private:
-  void swap(DeviceBuffer& other) noexcept {
-    std::swap(data_, other.data_), std::swap(size_, other.size_), std::swap(capacity_, other.capacity_);
-  }
-
   T* data_ = nullptr;
   std::size_t size_ = 0, capacity_ = 0;
 };

@@ -15,7 +15,7 @@ inline namespace RINGLET_ISA {
 template <class T>
 struct Octet {
 #if defined(__CUDACC__)
-  struct Vector {
+  struct alignas(16) Vector {  // as much as a thread loads at once
     T lane[8];
     RINGLET_KERNEL T& operator[](int k) { return lane[k]; }
     RINGLET_KERNEL const T& operator[](int k) const { return lane[k]; }

@@ -10,9 +10,11 @@ namespace ringlet::kernels {
 // Blocks of one warp: with about 250 registers a thread, a multiprocessor holds fewer warps than blocks, so
 // larger blocks would gain nothing and would spread a small groom over fewer multiprocessors. Asking for one
 // block at least lets the compiler use all 255 registers.
-inline constexpr int kBlock = 32;
+inline constexpr int kStrandBlock = 32;
+// For what needs few registers and no neighbours.
+inline constexpr int kLightBlock = 128;
 
-template <class Function>
+template <int kBlock, class Function>
 __global__ void __launch_bounds__(kBlock, 1)
     call_threads(const __grid_constant__ Function function, int threads) {
   const int thread = static_cast<int>(blockIdx.x) * kBlock + static_cast<int>(threadIdx.x);
@@ -35,12 +37,20 @@ class CudaStream {
   cudaStream_t get() const { return stream_; }
 
   // Calls function(thread) on the device for each thread in [0, threads).
-  template <class Function>
+  template <int kBlock = kStrandBlock, class Function>
   void parallel_for(const std::string& name, int threads, const Function& function) {
     if (threads <= 0) return;
+    launch(name, [&] {
+      call_threads<kBlock><<<(threads - 1) / kBlock + 1, kBlock, 0, stream_>>>(function, threads);
+    });
+  }
+
+  // Calls what queues work on the stream, which is timed and fails under this name.
+  template <class Queue>
+  void launch(const std::string& name, const Queue& queue) {
     last_ = name;
     if (timing_ == CudaTiming::kOn) begin_timing(name);
-    call_threads<<<(threads - 1) / kBlock + 1, kBlock, 0, stream_>>>(function, threads);
+    queue();
     check_cuda(cudaGetLastError(), "launching '" + name + "'");
     if (timing_ == CudaTiming::kOn) check_cuda(cudaEventRecord(events_.back().stop, stream_), "timing");
   }

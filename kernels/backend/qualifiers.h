@@ -6,7 +6,8 @@
 //
 // RINGLET_KERNEL marks what must be inlined (packs live in registers), RINGLET_FUNCTION what the compiler may
 // call, RINGLET_OUTLINED what a GPU had better call: inlined at each of its many uses it would cost more
-// registers than a thread has. RINGLET_LAMBDA stands after the captures of one that a backend calls for each index.
+// registers than a thread has. RINGLET_LAMBDA marks what a backend calls for each index, after the captures
+// of a lambda: code of the device alone.
 #pragma once
 
 #ifndef RINGLET_ISA
@@ -17,7 +18,7 @@
 #define RINGLET_KERNEL __host__ __device__ __forceinline__
 #define RINGLET_FUNCTION __host__ __device__ inline
 #define RINGLET_OUTLINED __host__ __device__ __noinline__
-#define RINGLET_LAMBDA __host__ __device__
+#define RINGLET_LAMBDA __device__
 #else
 #define RINGLET_KERNEL inline __attribute__((always_inline))
 #define RINGLET_FUNCTION inline

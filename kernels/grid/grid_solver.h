@@ -180,22 +180,21 @@ class GridSolver final : public HairGrid<T> {
 
   // The coordinates of the lowest tile, one lower for the halo; returns how many bits a key needs.
   int find_bounds() {
-    const GridData<T>& g = data_;
-    const T* particle = g.particle;
     int bits = 1;
     for (int c = 0; c < 3; ++c) {
-      const auto bound = [&](T sign) {
-        return static_cast<std::int32_t>(
-            backend_.largest("grid: bounds", g.particles, -kFarCells, [=] RINGLET_LAMBDA(int i) {
-              return static_cast<double>(sign) *
-                     (floor_to_int(particle[static_cast<std::int64_t>(i) * 8 + c]) >> 2);
-            }));
-      };
-      data_.low[c] = -bound(T(-1)) - 1;
-      data_.extent[c] = bound(T(1)) + 2 - data_.low[c];
+      data_.low[c] = -furthest(c, -1) - 1;
+      data_.extent[c] = furthest(c, 1) + 2 - data_.low[c];
       while (data_.extent[c] > 1 << bits) ++bits;
     }
     return 3 * bits;
+  }
+  // The last tile with a particle along an axis, or against it (`sign` -1).
+  std::int32_t furthest(int axis, int sign) {
+    const T* along = data_.particle + axis;
+    return static_cast<std::int32_t>(
+        backend_.largest("grid: bounds", data_.particles, -kFarCells, [=] RINGLET_LAMBDA(int i) {
+          return static_cast<double>(sign) * (floor_to_int(along[static_cast<std::int64_t>(i) * 8]) >> 2);
+        }));
   }
 
   void cut_pieces(int bits) {
@@ -344,28 +343,23 @@ class GridSolver final : public HairGrid<T> {
   // ---- Cells
 
   void find_walls() {
-    wall_.resize(data_.tiles + 1);
-    std::int32_t* wall = wall_.data();
+    wall_.resize(data_.tiles), flag_.resize(data_.tiles + 1);
+    std::int32_t *number = flag_.data(), *wall = wall_.data();
     data_.wall = wall;
     backend_.parallel_for(
         "grid: near walls", data_.tiles + 1,
-        [g = data_] RINGLET_LAMBDA(int tile) {
-          g.wall[tile] = tile < g.tiles && has_fluid_faces(g, tile) && near_wall(g, tile) ? 1 : 0;
+        [g = data_, number] RINGLET_LAMBDA(int tile) {
+          number[tile] = tile < g.tiles && has_fluid_faces(g, tile) && near_wall(g, tile) ? 1 : 0;
         },
         kTileChunk);
-    const std::int32_t walls = backend_.scan("grid: near walls", wall_, data_.tiles + 1);
+    const std::int32_t walls = backend_.scan("grid: near walls", flag_, data_.tiles + 1);
     wall_tile_.resize(walls), opening_.resize(static_cast<std::size_t>(walls) * kTileCells * kWallValues);
     std::int32_t* tile_of = wall_tile_.data();
     data_.opening = opening_.data();
-    const std::int32_t tiles = data_.tiles;
-    backend_.parallel_for("grid: near walls", 1, [=] RINGLET_LAMBDA(int) {
-      for (int tile = 0; tile < tiles; ++tile) {
-        const bool is_near = wall[tile + 1] != wall[tile];
-        if (is_near)
-          tile_of[wall[tile]] = tile;
-        else
-          wall[tile] = -1;
-      }
+    backend_.parallel_for("grid: near walls", data_.tiles, [=] RINGLET_LAMBDA(int tile) {
+      const bool is_near = number[tile + 1] != number[tile];
+      wall[tile] = is_near ? number[tile] : -1;
+      if (is_near) tile_of[number[tile]] = tile;
     });
     backend_.parallel_for(
         "grid: walls", walls * kTileCells,

@@ -54,6 +54,7 @@ struct GridStep {
   std::int32_t clamped;  // prescribed particles at each root
   const SolidView* solids;
   std::int32_t solid_count;
+  std::int32_t frame;  // stepped to: a deforming solid's level sets are the same throughout it
 };
 
 // The wind that gets through the hair (hair_shelter.h).

@@ -2,6 +2,7 @@
 #include "kernels/launch/cuda_kernels.h"
 
 #include "kernels/backend/parallel_for.h"
+#include "kernels/launch/cuda_grid.h"
 #include "kernels/launch/cuda_solids.h"
 #include "kernels/launch/cuda_threads.h"
 
@@ -78,6 +79,7 @@ class Strands final : public CudaStrands {
     fetch("elongation", elongation_, host.elongation);
     fetch("companions", companion_position_, host.companion_position);
     fetch("companions", companion_velocity_, host.companion_velocity);
+    fetch("shelter", shelter_, host.shelter);
     stream_.synchronize();
   }
   void upload_roots(std::span<const float> motion, std::span<const double> points) override {
@@ -145,6 +147,17 @@ class Strands final : public CudaStrands {
     stream_.parallel_for("length step", threads(), LengthStepThread{step, scratch()});
   }
 
+  void grid_at_rest(const GridStep<float>& host) override { grid().at_rest(on_device(host)); }
+  GridFigures grid_step(const GridStep<float>& host) override {
+    upload_solids({host.solids, std::size_t(host.solid_count)}, host.frame);
+    return grid().run(on_device(host));
+  }
+  void grid_shelter(const HairShelter<float>& host) override {
+    HairShelter<float> shelter = host;
+    shelter.share = shelter_.data();
+    grid().shelter(shelter);
+  }
+
   void download_figures(std::span<float> strands, std::span<float> contacts,
                         std::span<float> lengths) override {
     if (!strands.empty()) fetch("strand figures", strand_figures_, strands);
@@ -161,7 +174,7 @@ class Strands final : public CudaStrands {
            shelter_.bytes() + front_.bytes() + rear_.bytes() + position_.bytes() + velocity_.bytes() +
            root_motion_.bytes() + root_points_.bytes() + skin_.bytes() + strand_figures_.bytes() +
            contact_figures_.bytes() + length_figures_.bytes() + scratch_begin_.bytes() + scratch_.bytes() +
-           solids_.bytes();
+           solids_.bytes() + (grid_ ? grid_->bytes() : 0);
   }
 
  private:
@@ -173,6 +186,15 @@ class Strands final : public CudaStrands {
   }
   StrandState<float> state() const {
     return {position_.data(), velocity_.data(), companion_position_.data(), companion_velocity_.data()};
+  }
+  HairGrid<float>& grid() {
+    if (!grid_) grid_ = make_cuda_grid(stream_);
+    return *grid_;
+  }
+  GridStep<float> on_device(GridStep<float> step) const {
+    step.batches = batches(), step.state = state(), step.root_points = root_points_.data();
+    step.solids = solids_.views(), step.solid_count = solids_.count();
+    return step;
   }
   WarpScratch scratch() const { return {scratch_begin_.data(), scratch_.data(), scratch_reals_}; }
 
@@ -211,6 +233,7 @@ class Strands final : public CudaStrands {
   DeviceBuffer<std::int32_t> scratch_begin_;
   DeviceBuffer<float> scratch_;
   CudaSolids solids_;
+  std::unique_ptr<HairGrid<float>> grid_;  // on the stream, which outlives it
 };
 
 }  // namespace

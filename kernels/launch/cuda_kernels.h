@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "kernels/launch/hair_grid.h"
 #include "kernels/solid/solid_view.h"
 #include "kernels/strand/length_step.h"
 #include "kernels/strand/strand_batch.h"
@@ -65,7 +66,7 @@ struct StateArrays {
   std::span<T> position, velocity;
   std::span<T> elongation = {};                                   // [rows] Elongation::memory
   std::span<T> companion_position = {}, companion_velocity = {};  // [rows][3] as StrandState
-  std::span<T> shelter = {};  // [rows] as WindStep; the device only reads it, so that it does not come back
+  std::span<T> shelter = {};                                      // [rows] as WindStep
 };
 
 // The strands of a run on the device. Arrays are laid out as on the host (StrandBatches, StrandState,
@@ -99,6 +100,12 @@ class CudaStrands {
   virtual void contact_step(const ContactParameters& parameters) = 0;
 
   virtual void length_step(const LengthStep<float>& step) = 0;  // pointers as strand_step's
+
+  // The grid of hair against hair, as HairGrid's calls: pointers as strand_step's, solids as upload_solids
+  // takes them. What gets through of the wind goes to the state's shelter.
+  virtual void grid_at_rest(const GridStep<float>& step) = 0;
+  virtual GridFigures grid_step(const GridStep<float>& step) = 0;
+  virtual void grid_shelter(const HairShelter<float>& shelter) = 0;
 
   // Of the last step of each kind: [batches][kFigures], [batches][kContactFigures] and
   // [batches][kLengthFigures]; an empty span is left out.

@@ -26,6 +26,26 @@ kernels::CudaDevice device_or_error() {
   throw Error(ErrorKind::kDevice, "--backend cuda", why_not, "use --backend cpu or auto");
 }
 
+// The grid that the device's strands have.
+class DeviceGrid : public kernels::HairGrid<float> {
+ public:
+  explicit DeviceGrid(kernels::CudaStrands& strands) : strands_(strands) {}
+
+  void at_rest(const kernels::GridStep<float>& step) override {
+    on_device([&] { strands_.grid_at_rest(step); });
+  }
+  kernels::GridFigures run(const kernels::GridStep<float>& step) override {
+    return on_device([&] { return strands_.grid_step(step); });
+  }
+  void shelter(const kernels::HairShelter<float>& shelter) override {
+    on_device([&] { strands_.grid_shelter(shelter); });
+  }
+  std::size_t bytes() const override { return 0; }  // the device's are counted with the strands
+
+ private:
+  kernels::CudaStrands& strands_;
+};
+
 // The strands live on the device; of each step only the figures come back.
 class CudaExecutor : public Executor<float> {
  public:
@@ -52,7 +72,7 @@ class CudaExecutor : public Executor<float> {
   void fetch(state::StrandState<float>& state) override {
     on_device([&] {
       strands_->download_state({state.position, state.velocity, state.elongation, state.companion_position,
-                                state.companion_velocity});
+                                state.companion_velocity, state.shelter});
     });
   }
 
@@ -86,6 +106,9 @@ class CudaExecutor : public Executor<float> {
       strands_->length_step(step);
       strands_->download_figures({}, {}, {step.figures, lanes_ * kernels::kLengthFigures});
     });
+  }
+  std::unique_ptr<kernels::HairGrid<float>> make_hair_grid() override {
+    return std::make_unique<DeviceGrid>(*strands_);
   }
 
  private:

@@ -15,6 +15,8 @@ template <class T>
 struct ShelterStep;
 template <class T>
 struct LengthStep;
+template <class T>
+class HairGrid;
 }  // namespace ringlet::kernels
 
 namespace ringlet::effects {
@@ -38,6 +40,8 @@ class Executor {
   virtual void wind_step(const kernels::WindStep<T>& step) = 0;
   virtual void shelter_step(const kernels::ShelterStep<T>& step) = 0;
   virtual void length_step(const kernels::LengthStep<T>& step) = 0;
+  // The grid of hair against hair, on the strands where they are. To be used only while the executor lives.
+  virtual std::unique_ptr<kernels::HairGrid<T>> make_hair_grid() = 0;
 };
 
 // `instruction_set`: avx512, avx2 or generic; empty: the widest this processor has. Throws Error{kUsage} for

@@ -1,7 +1,5 @@
 #include "effects/grid/grid_stage.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 
@@ -12,11 +10,6 @@
 namespace ringlet::effects {
 namespace {
 
-void run_chunks(void*, int chunks, void (*body)(const void* context, int chunk), const void* context) {
-  tbb::parallel_for(0, chunks, [=](int chunk) { body(context, chunk); });
-}
-
-// The grid works on the host's state with the CPU's kernels, wherever the strands are stepped.
 template <class T>
 class GridStage : public Stage<T> {
  public:
@@ -29,8 +22,7 @@ class GridStage : public Stage<T> {
         state_(state),
         views_(solids.size()),
         lengths_(scene, model, state),
-        grid_(kernels::make_hair_grid<T>(kernels::instruction_set_named(executor.instruction_set().c_str()),
-                                         {run_chunks, nullptr})) {
+        grid_(executor.make_hair_grid()) {
     if (options_.shelter) state_.shelter.assign(state_.position.size() / 3, T(1));
   }
 
@@ -38,11 +30,12 @@ class GridStage : public Stage<T> {
   std::size_t bytes() const override {
     return grid_->bytes() + lengths_.bytes() + views_.size() * sizeof(kernels::SolidView);
   }
-  // Of the device, which only holds the lengths.
+  // Of the lengths: how many the grid has depends on what it finds.
   std::int64_t launches() const override { return each_substep() ? scene_.model.substeps : 1; }
   std::int64_t diverged_strand() const override { return diverged_; }
 
-  void at_rest(Executor<T>&, const state::StrandState<T>& rest) override {
+  void at_rest(Executor<T>& executor, const state::StrandState<T>& rest) override {
+    grid_ = executor.make_hair_grid();  // the executor may be another than before
     const double side = longest_side(model_, rest, moving_axes(model_, rest, 1, 1));
     cell_ = side > 0 ? side / options_.resolution : 1;
     kernels::GridStep<T> step = step_of(scene_.model.substeps / scene_.frames.fps);
@@ -56,14 +49,13 @@ class GridStage : public Stage<T> {
   void run(Executor<T>& executor, const Substep& substep, FrameReport& report) override {
     diverged_ = -1;
     if (!substep.last_of_frame && !each_substep()) return;
-    executor.fetch(state_);
     for (std::size_t k = 0; k < solids_.size(); ++k)
       views_[k] = solids_[k].at(substep.time_before, substep.time);
     kernels::GridStep<T> step = step_of(substep.step);
     step.axes = moving_axes(model_, state_, cell_, substep.step);
+    step.frame = substep.frame;
     const kernels::GridFigures figures = grid_->run(step);
     if (options_.shelter) find_shelter();
-    executor.submit(state_);
     if (figures.moved) {
       lengths_.hold(executor, substep, step.interval, report);
       diverged_ = lengths_.diverged_strand();

@@ -37,5 +37,11 @@ RINGLET_KERNEL std::uint32_t lane_bits(PackMask<double, 2> mask) {
 #endif
 #endif
 
+// `any` by way of the bits: compilers take `any` lane by lane.
+template <class Mask>
+RINGLET_KERNEL bool some(Mask mask) {
+  return lane_bits(mask) != 0;
+}
+
 }  // namespace RINGLET_ISA
 }  // namespace ringlet::kernels

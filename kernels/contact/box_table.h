@@ -78,18 +78,34 @@ struct BoxLevels {
   }
 };
 
-// Sorted by cell. Components of the boxes lie one after the other, `stride` apart: the box that the table
-// goes by, then those at the end and at the start by themselves.
+// Sorted by cell, and within a cell by place: in an order that does not depend on that of the strands.
 struct BoxTable {
   BoxLevels levels;
   const std::int32_t* first;    // [total_cells + 1] of each cell
   const std::int32_t* segment;  // [boxes] its number
   const std::int32_t* strand;   // [boxes]
-  const float* components;      // [18][stride]
-  std::int32_t stride;
+  const float* components;      // see at()
   std::int32_t boxes;
+
+  // Boxes lie in blocks, in each component after component.
+  static constexpr std::int32_t kBlock = 16;
+  RINGLET_KERNEL static std::int64_t at(std::int32_t component, std::int32_t box);
 };
-inline constexpr int kBoxComponents = 18;
+// Of the box's low and high corner, then where the segment begins and its vector, at the start and at the
+// end.
+enum BoxComponent {
+  kLow,
+  kHigh = 3,
+  kStartBegin = 6,
+  kStartAlong = 9,
+  kEndBegin = 12,
+  kEndAlong = 15,
+  kBoxComponents = 18
+};
+
+RINGLET_KERNEL std::int64_t BoxTable::at(std::int32_t component, std::int32_t box) {
+  return (static_cast<std::int64_t>(box / kBlock) * kBoxComponents + component) * kBlock + box % kBlock;
+}
 
 // Calls visit(begin, end) for the runs of the table among which all boxes of `level` are that overlap `box`.
 template <class Visit>

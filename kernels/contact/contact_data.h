@@ -20,10 +20,6 @@ struct HairPlaces {
   const Place<T>*start, *end;
 };
 
-struct SegmentNumbers {
-  std::int32_t a, b;
-};
-
 template <class R>
 RINGLET_KERNEL Vector3<R> load_lanes(const Scalar<R> (&lanes)[3][Traits<R>::kWidth]) {
   return {load<R>(lanes[0]), load<R>(lanes[1]), load<R>(lanes[2])};
@@ -61,8 +57,7 @@ RINGLET_KERNEL SegmentPair<R> gather_pair(const HairPlaces<Scalar<R>>& places, c
           gather_segment<R>(places.end, a), gather_segment<R>(places.end, b)};
 }
 
-// Which of two segments is `a` must not depend on the strands' order in the groom: the one that comes first
-// by where it is.
+// An order of segments that does not depend on the strands' order in the groom: by where they are.
 template <class T>
 RINGLET_KERNEL bool comes_first(const Place<T>* places, std::int32_t one, std::int32_t other) {
   for (int offset = 0; offset <= kLanes; offset += kLanes) {
@@ -72,6 +67,13 @@ RINGLET_KERNEL bool comes_first(const Place<T>* places, std::int32_t one, std::i
     if (p.z != q.z) return p.z < q.z;
   }
   return one < other;  // in the very same place
+}
+
+// Rounded so that sums are exact, and so the same in any order: to multiples of 2^-36, which leaves room for
+// a sum of 2^16.
+RINGLET_KERNEL double summable(double a) {
+  constexpr double kShift = 1.5 * 65536.0;  // 1.5 * 2^(52 - 36)
+  return (a + kShift) - kShift;
 }
 
 template <class T>

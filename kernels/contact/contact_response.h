@@ -39,12 +39,5 @@ RINGLET_KERNEL Vector3<R> across(Vector3<R> normal, Vector3<R> a) {
   return fma(R(0) - dot(normal, a), normal, a);
 }
 
-// The impulse rounded so that sums of them are exact, and so the same in any order: to multiples of 2^-36,
-// which leaves room for 2^16 of them of a metre each.
-RINGLET_KERNEL double summable(double a) {
-  constexpr double kShift = 1.5 * 65536.0;  // 1.5 * 2^(52 - 36)
-  return (a + kShift) - kShift;
-}
-
 }  // namespace RINGLET_ISA
 }  // namespace ringlet::kernels

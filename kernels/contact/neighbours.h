@@ -31,14 +31,14 @@ class Neighbours {
   std::size_t bytes() const {
     return sums_.bytes() + nodes_.bytes() + filled_.bytes() + box_.bytes() + key_.bytes() + order_.bytes() +
            first_.bytes() + segment_.bytes() + strand_.bytes() + components_.bytes() + pool_.bytes() +
-           next_.bytes() + last_.bytes() + count_.bytes() + a_.bytes() + b_.bytes();
+           next_.bytes() + last_.bytes() + count_.bytes() + kept_.bytes() + a_.bytes() + b_.bytes();
   }
 
  private:
   // What counts as near, in sums of radii: about as far as contacts move hair in an application.
   static constexpr double kMarginReaches = 4;
   static constexpr int kLatticeCells = 8;   // of the mean motion, along the longest axis
-  static constexpr float kSteepest = 0.3f;  // slope of the mean motion that is aimed at [-]
+  static constexpr float kSteepest = 0.2f;  // slope of the mean motion that is aimed at [-]
   static constexpr int kSmoothings = 48;
 
   // Lowest and highest of f(particle)[axis] over particles with a segment.
@@ -180,6 +180,7 @@ class Neighbours {
     table_.boxes = static_cast<std::int32_t>(segments);
     table_.levels = BoxLevels::make(low, high, static_cast<float>(sizes / (segments > 0 ? segments : 1)));
     sort_boxes(backend, strand, particles);
+    order_cells(backend, places);
     gather_boxes(backend, places, strand);
   }
 
@@ -209,18 +210,38 @@ class Neighbours {
     });
   }
 
+  void order_cells(Backend& backend, const HairPlaces<T>& places) {
+    std::uint32_t* order = order_.data();
+    const std::int32_t* first = first_.data();
+    const Place<T>* end = places.end;
+    backend.parallel_for("order contact cells", table_.levels.total_cells,
+                         [=] RINGLET_LAMBDA(std::int32_t cell) {
+                           for (std::int32_t k = first[cell] + 1; k < first[cell + 1]; ++k) {
+                             const std::uint32_t moved = order[k];
+                             std::int32_t to = k;
+                             for (; to > first[cell]; --to) {
+                               if (comes_first(end, static_cast<std::int32_t>(order[to - 1]),
+                                               static_cast<std::int32_t>(moved)))
+                                 break;
+                               order[to] = order[to - 1];
+                             }
+                             order[to] = moved;
+                           }
+                         });
+  }
+
   void gather_boxes(Backend& backend, const HairPlaces<T>& places, const std::int32_t* strand) {
-    constexpr int kPad = 16;  // packs read past the end
-    const std::int32_t boxes = table_.boxes, stride = (boxes + 2 * kPad - 1) / kPad * kPad;
+    // Whole blocks, for packs read past the end.
+    const std::int32_t boxes = table_.boxes,
+                       room = (boxes + BoxTable::kBlock - 1) / BoxTable::kBlock * BoxTable::kBlock;
     segment_.resize(boxes), strand_.resize(boxes);
-    components_.resize(static_cast<std::size_t>(stride) * kBoxComponents);
+    components_.resize(static_cast<std::size_t>(room) * kBoxComponents);
     float* components = components_.data();
     std::int32_t *segments = segment_.data(), *strands = strand_.data();
     const std::uint32_t* order = order_.data();
     const Box* box = box_.data();
-    backend.parallel_for("gather boxes", stride, [=] RINGLET_LAMBDA(std::int32_t k) {
-      float* to = components + k;
-      const auto put = [&](int which, float value) { to[static_cast<std::int64_t>(which) * stride] = value; };
+    backend.parallel_for("gather boxes", room, [=] RINGLET_LAMBDA(std::int32_t k) {
+      const auto put = [&](int which, float value) { components[BoxTable::at(which, k)] = value; };
       if (k >= boxes) {
         for (int c = 0; c < kBoxComponents; ++c) put(c, 3e38f);
         return;
@@ -228,33 +249,33 @@ class Neighbours {
       const auto p = static_cast<std::int32_t>(order[k]);
       segments[k] = p, strands[k] = strand[p];
       for (int c = 0; c < 3; ++c) {
-        put(c, box[p].low[c]), put(3 + c, box[p].high[c]);
-        const T end[2] = {(&places.end[p].x)[c], (&places.end[p + kLanes].x)[c]};
-        const T start[2] = {(&places.start[p].x)[c], (&places.start[p + kLanes].x)[c]};
-        put(6 + c, static_cast<float>(min(end[0], end[1])));
-        put(9 + c, static_cast<float>(max(end[0], end[1])));
-        put(12 + c, static_cast<float>(min(start[0], start[1])));
-        put(15 + c, static_cast<float>(max(start[0], start[1])));
+        put(kLow + c, box[p].low[c]), put(kHigh + c, box[p].high[c]);
+        const float start = static_cast<float>((&places.start[p].x)[c]),
+                    end = static_cast<float>((&places.end[p].x)[c]);
+        put(kStartBegin + c, start), put(kEndBegin + c, end);
+        put(kStartAlong + c, static_cast<float>((&places.start[p + kLanes].x)[c]) - start);
+        put(kEndAlong + c, static_cast<float>((&places.end[p + kLanes].x)[c]) - end);
       }
     });
     table_.first = first_.data(), table_.segment = segments, table_.strand = strands;
-    table_.components = components, table_.stride = stride;
+    table_.components = components;
   }
 
   // Again with more memory where the pool was too small.
   void search(Backend& backend, const HairPlaces<T>& places, const std::int32_t* strand,
               std::int32_t particles, T reach, float box_margin) {
     groups_ = (table_.boxes + kGroupSegments - 1) / kGroupSegments;
-    last_.resize(groups_), count_.resize(groups_ + 1), taken_.resize(1);
+    last_.resize(groups_), count_.resize(groups_), kept_.resize(groups_ + 1);
+    taken_.resize(1), ranks_.resize(kMostPairs);
     std::int32_t needed = groups_ + groups_ / 2 + 1;
     do {
       if (static_cast<std::size_t>(needed) > next_.size())
         next_.resize(needed), pool_.resize(static_cast<std::size_t>(needed) * kPairBlock);
-      std::int32_t* taken = taken_.data();
-      std::int32_t* end = count_.data() + groups_;
-      backend.parallel_for("clear pool", 1, [=] RINGLET_LAMBDA(std::int32_t) { *taken = *end = 0; });
-      const PairPool pool{pool_.data(), next_.data(), taken, static_cast<std::int32_t>(next_.size()),
-                          last_.data(), count_.data()};
+      std::int32_t *taken = taken_.data(), *ranks = ranks_.data();
+      backend.parallel_for("clear pool", kMostPairs,
+                           [=] RINGLET_LAMBDA(std::int32_t rank) { *taken = ranks[rank] = 0; });
+      const PairPool pool{pool_.data(), next_.data(),  taken, static_cast<std::int32_t>(next_.size()),
+                          last_.data(), count_.data(), ranks};
       const PairSearch<F, R> work{table_, places, strand, particles, box_margin, margin_, reach, pool};
       backend.parallel_for("contact pairs", groups_, work, kSearchChunk);
       needed = static_cast<std::int32_t>(backend.largest(
@@ -262,32 +283,67 @@ class Neighbours {
     } while (needed > static_cast<std::int32_t>(next_.size()));
   }
 
+  // Calls visit(pair, its number among the group's) for those of a group's pairs that have a lower rank.
+  template <class Visit>
+  RINGLET_KERNEL static void for_ranked(const PairPool& pool, std::int32_t group, std::int32_t rank,
+                                        const Visit& visit) {
+    std::int32_t number = 0;
+    for (std::int32_t block = pool.last[group], count = pool.count[group]; count > 0;
+         block = pool.next[block]) {
+      const std::int32_t from = (count - 1) / kPairBlock * kPairBlock;
+      for (std::int32_t k = from; k < count; ++k) {
+        const RankedPair& pair = pool.pairs[static_cast<std::int64_t>(block) * kPairBlock + k - from];
+        if (pair.rank < rank) visit(pair, number++);
+      }
+      count = from;
+    }
+  }
+
+  // The rank from which on pairs are left out, so that no more than kMostLookedAt remain.
+  std::int32_t rank_limit(Backend& backend) {
+    std::int32_t* ranks = ranks_.data();
+    return static_cast<std::int32_t>(backend.largest("ranks", 1, 0, [=] RINGLET_LAMBDA(std::int32_t) {
+      std::int32_t rank = 0;
+      for (std::int64_t pairs = 0; rank < kMostPairs; ++rank) {
+        pairs += ranks[rank];
+        if (rank >= kLeastPairs && pairs > kMostLookedAt) break;
+      }
+      return static_cast<double>(rank);
+    }));
+  }
+
   // From the groups' blocks into one list, in the order of the table.
   std::int32_t gather_pairs(Backend& backend) {
-    const std::int32_t pairs = backend.scan("count pairs", count_, groups_ + 1);
+    const std::int32_t groups = groups_, limit = rank_limit(backend);
+    const PairPool pool{pool_.data(), next_.data(), nullptr, 0, last_.data(), count_.data(), nullptr};
+    std::int32_t* kept = kept_.data();
+    backend.parallel_for(
+        "count pairs", groups + 1,
+        [=] RINGLET_LAMBDA(std::int32_t group) {
+          kept[group] = 0;
+          if (group < groups)
+            for_ranked(pool, group, limit, [&](const RankedPair&, std::int32_t) { ++kept[group]; });
+        },
+        kSearchChunk);
+    const std::int32_t pairs = backend.scan("start pairs", kept_, groups + 1);
     constexpr int kPad = 16;
     a_.resize(pairs + kPad), b_.resize(pairs + kPad);
     std::int32_t *a = a_.data(), *b = b_.data();
-    const SegmentNumbers* pool = pool_.data();
-    const std::int32_t *next = next_.data(), *last = last_.data(), *first = count_.data();
     backend.parallel_for(
-        "gather pairs", groups_,
+        "gather pairs", groups,
         [=] RINGLET_LAMBDA(std::int32_t group) {
-          const std::int32_t begin = first[group];
-          std::int32_t count = first[group + 1] - begin;
-          for (std::int32_t block = last[group]; count > 0; block = next[block]) {
-            const std::int32_t from = (count - 1) / kPairBlock * kPairBlock;
-            for (std::int32_t k = from; k < count; ++k) {
-              const SegmentNumbers& pair = pool[static_cast<std::int64_t>(block) * kPairBlock + k - from];
-              a[begin + k] = pair.a, b[begin + k] = pair.b;
-            }
-            count = from;
-          }
+          for_ranked(pool, group, limit, [&](const RankedPair& pair, std::int32_t number) {
+            a[kept[group] + number] = pair.a, b[kept[group] + number] = pair.b;
+          });
         },
         kSearchChunk);
     return pairs;
   }
 
+  // Where there are more pairs, in dense hair that moves far in a frame, each segment looks at fewer of its
+  // own, those that matter most; never at fewer than kLeastPairs.
+  static constexpr std::int64_t kMostLookedAt = 1 << 19;
+  static constexpr std::int32_t kLeastPairs = 2;
   static constexpr int kSearchChunk = 8;  // groups
 
   T margin_ = T(0);
@@ -300,9 +356,9 @@ class Neighbours {
   Buffer<Box> box_;
   Buffer<std::uint64_t> key_;
   Buffer<std::uint32_t> order_;
-  Buffer<std::int32_t> first_, segment_, strand_, next_, last_, count_, taken_, a_, b_;
+  Buffer<std::int32_t> first_, segment_, strand_, next_, last_, count_, kept_, taken_, ranks_, a_, b_;
   Buffer<float> components_;
-  Buffer<SegmentNumbers> pool_;
+  Buffer<RankedPair> pool_;
 };
 
 }  // namespace RINGLET_ISA

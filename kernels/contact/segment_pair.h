@@ -14,6 +14,7 @@
 // A crossing and a return within one stretch counts as none, and so does one that is undone by going round a
 // tip.
 #pragma once
+#include "kernels/backend/lane_bits.h"
 #include "kernels/backend/vector.h"
 
 namespace ringlet::kernels {
@@ -213,12 +214,12 @@ RINGLET_FUNCTION PairContact<R> find_contact(const SegmentPair<R>& pair, R reach
       select(inside, select(first < R(0), per_sine, -per_sine) * cross(pair.a.along(), pair.b.along()),
              inverse_or_zero(contact.distance, R(Scalar<R>(1e-12))) * apart);
 
-  if (any(changed & !parallel)) {
+  if (some(changed & !parallel)) {
     const PairContact<R> crossing = crossing_contact(pair, first);
     contact.crossed = crossing.crossed & changed & !parallel;
     set_contact(contact.crossed, crossing, contact);
   }
-  if (any(parallel)) {
+  if (some(parallel)) {
     const PairContact<R> beside = parallel_contact(pair, products, reach);
     contact.crossed = contact.crossed | (beside.crossed & parallel);
     set_contact(parallel, beside, contact);

@@ -35,6 +35,34 @@ RINGLET_FUNCTION std::int32_t fluid_cell(const GridData<T>& g, std::int64_t node
   return mask & bit ? g.first_cell[tile] + ones(mask & (bit - 1)) : -1;
 }
 
+// A cell beside the fluid is no air where its middle is this near to a solid, or within it [cells].
+inline constexpr double kWallShare = 0.25;
+
+// What of a face is open. Where the cell beyond it is solid it is the wall: there is nothing that hair could
+// be pressed into.
+template <class T>
+RINGLET_FUNCTION Opening<T> find_opening(const GridData<T>& g, const double* place, int axis, bool above,
+                                         bool below) {
+  Opening<T> opening{T(1), T(0)};
+  double beyond[3] = {place[0], place[1], place[2]};
+  beyond[axis] += above ? -0.5 : 0.5;
+  for (std::int32_t s = 0; s < g.step.solid_count; ++s) {
+    const SolidView& solid = g.step.solids[s];
+    const Vector3<T> p = in_solid<T>(g.step.axes, solid, place);
+    const BlendedSample<T> level(solid, p);
+    const auto cells = [&](T distance) {
+      return (distance - static_cast<T>(solid.offset)) / static_cast<T>(g.step.axes.cell);
+    };
+    T share = min(max(cells(level.distance) + T(0.5), T(0)), T(1));
+    if (share < T(1) && above != below &&
+        cells(BlendedSample<T>(solid, in_solid<T>(g.step.axes, solid, beyond)).distance) < T(kWallShare))
+      share = T(0);
+    if (!(share < opening.share)) continue;
+    opening = {share, wall_velocity(g, solid, place, p, level.first.triangle, axis)};
+  }
+  return opening;
+}
+
 template <class T>
 RINGLET_FUNCTION void find_openings(const GridData<T>& g, std::int32_t tile, int cell) {
   std::int32_t corner[3];
@@ -43,22 +71,13 @@ RINGLET_FUNCTION void find_openings(const GridData<T>& g, std::int32_t tile, int
   const std::int64_t node = static_cast<std::int64_t>(tile) * kTileCells + cell;
   const bool above = fluid_cell(g, node) >= 0;
   for (int axis = 0; axis < 3; ++axis) {
-    if (!above && fluid_cell(g, next_node(g, node, axis, -1)) < 0) continue;
+    const bool below = fluid_cell(g, next_node(g, node, axis, -1)) >= 0;
+    if (!above && !below) continue;
     double place[3];
     for (int c = 0; c < 3; ++c)
       place[c] = kTileEdge * g.low[c] + corner[c] + coordinate_in_tile(cell, c) + (c == axis ? 0.0 : 0.5);
-    T open = T(1), velocity = T(0);
-    for (std::int32_t s = 0; s < g.step.solid_count; ++s) {
-      const SolidView& solid = g.step.solids[s];
-      const Vector3<T> p = in_solid<T>(g.step.axes, solid, place);
-      const BlendedSample<T> level(solid, p);
-      const T distance = (level.distance - static_cast<T>(solid.offset)) / static_cast<T>(g.step.axes.cell);
-      const T outside = min(max(distance + T(0.5), T(0)), T(1));
-      if (!(outside < open)) continue;
-      open = outside;
-      velocity = wall_velocity(g, solid, place, p, level.first.triangle, axis);
-    }
-    to[axis] = open, to[3 + axis] = velocity;
+    const Opening<T> opening = find_opening(g, place, axis, above, below);
+    to[axis] = opening.share, to[3 + axis] = opening.velocity;
   }
 }
 
@@ -157,12 +176,24 @@ RINGLET_FUNCTION T wanted_divergence(const T* values) {
 template <class T>
 RINGLET_FUNCTION T pressed(const GridData<T>& g, const double* pressure, std::int64_t node, int axis) {
   const T lightness = g.lightness[node * 3 + axis];
-  if (!(lightness > T(0) && opening_of(g, node, axis).share > T(0))) return T(0);
+  if (!(lightness > T(0))) return T(0);
   const auto at = [&](std::int64_t n) {
     const std::int32_t cell = fluid_cell(g, n);
     return cell < 0 ? 0.0 : pressure[cell];
   };
   return lightness * static_cast<T>(at(next_node(g, node, axis, -1)) - at(node));
+}
+
+// The change of a face's velocity. One that a wall closes takes the wall's where pressed hair would lag
+// behind it.
+template <class T>
+RINGLET_FUNCTION T pressed_velocity(const GridData<T>& g, const double* pressure, std::int64_t node, int axis,
+                                    T before) {
+  const Opening<T> opening = opening_of(g, node, axis);
+  const T change = pressed(g, pressure, node, axis);
+  if (opening.share > T(0)) return change;
+  const T lag = opening.velocity - before;
+  return change * lag < T(0) ? lag : T(0);  // pressure would push it into the wall: hair is pressed onto it
 }
 
 // Readies a tile's nodes for the way back (`pressure` null: of places alone): the change of velocity and the
@@ -175,7 +206,7 @@ RINGLET_FUNCTION void press_velocities(const GridData<T>& g, const double* press
     T* values = g.node + node * kNodeValues + kFaceMass;
     if (!(values[0] > T(0) || values[2] > T(0) || values[4] > T(0))) continue;  // no hair, nothing to read
     for (int axis = 0; axis < 3; ++axis) {
-      const T change = fluid ? pressed(g, pressure, node, axis) : T(0);
+      const T change = fluid ? pressed_velocity(g, pressure, node, axis, values[2 * axis + 1]) : T(0);
       values[2 * axis] = fma(g.step.pic, values[2 * axis + 1], change), values[2 * axis + 1] = T(0);
     }
   }
@@ -187,8 +218,9 @@ RINGLET_FUNCTION void press_places(const GridData<T>& g, const double* pressure,
   for (int cell = 0; cell < kTileCells; ++cell) {
     const std::int64_t node = static_cast<std::int64_t>(tile) * kTileCells + cell;
     for (int axis = 0; axis < 3; ++axis)
-      g.node[node * kNodeValues + kFaceMass + 2 * axis + 1] =
-          min(max(pressed(g, pressure, node, axis), T(-1)), T(1));
+      if (opening_of(g, node, axis).share > T(0))
+        g.node[node * kNodeValues + kFaceMass + 2 * axis + 1] =
+            min(max(pressed(g, pressure, node, axis), T(-1)), T(1));
   }
 }
 

@@ -24,7 +24,7 @@ namespace ringlet::kernels {
 
 inline constexpr double kLeastStrands = 4;  // in a cell
 // A cell is fluid where its density is above this share of its target; elsewhere is air, of no pressure.
-inline constexpr double kFluidShare = 0.5;
+inline constexpr double kFluidShare = 0.4;
 // A face weighs at least this share of the face across the cell: pressure must not act on nothing.
 inline constexpr double kLeastFaceShare = 0.02;
 // Density is corrected by moving hair apart where it is above its target by this share; the correction of one

@@ -128,9 +128,10 @@ struct Chebyshev {
 
 template <class Backend, class T>
 struct Multigrid {
-  static constexpr std::int32_t kCoarsest = 8;   // cells that need no coarser level
-  static constexpr int kTwiceVisited = 4;        // levels, from the second on
-  static constexpr int kCoarsestSmoothings = 4;  // enough: such a level's condition is small
+  static constexpr std::int32_t kCoarsest = 8;                // cells that need no coarser level
+  static constexpr int kTwiceVisited = 4;                     // levels, from the second on
+  static constexpr int kFineGuesses = 2, kCoarseGuesses = 8;  // steps of Jacobi's
+  static constexpr int kCoarsestSmoothings = 4;               // enough: such a level's condition is small
 
   Level<Backend, T> level[kMostLevels];
   int levels = 0;
@@ -146,6 +147,25 @@ struct Multigrid {
     for (int k = 1; k < levels; ++k) {
       const Coarsening<T> at = coarsening(k);
       backend.parallel_for("multigrid: operator", level[k].cells, [at] RINGLET_LAMBDA(int p) { at.sum(p); });
+    }
+  }
+
+  // level[0].x becomes a guess at the x >= 0 that solves the complementarity problem of level[0]'s operator
+  // and
+  // right side: from the coarsest level up, a few projected steps of Jacobi's on each find to a cell or two
+  // where the solution ends. Takes the operator of all levels.
+  void guess_positive(Backend& backend) {
+    for (int k = 1; k < levels; ++k) sum_children(backend, k, level[k - 1].right.data());
+    for (int k = levels - 1; k >= 0; --k) {
+      T* x = level[k].x.data();
+      const bool coarsest = k + 1 == levels;
+      const T* coarse = coarsest ? nullptr : level[k + 1].x.data();
+      const std::int32_t* parent = level[k].parent.data();
+      const T* diagonal = level[k].diagonal.data();
+      backend.parallel_for("multigrid: guess", level[k].cells, [=] RINGLET_LAMBDA(int i) {
+        x[i] = coarse && diagonal[i] > T(0) ? coarse[parent[i]] : T(0);
+      });
+      for (int step = 0; step < (k == 0 ? kFineGuesses : kCoarseGuesses); ++step) project(backend, k);
     }
   }
 
@@ -231,14 +251,30 @@ struct Multigrid {
 
   void restrict_residual(Backend& backend, int k) {
     find_residual(backend, k);
-    const std::int32_t* child = level[k + 1].child.data();
-    const T* residual = level[k].residual.data();
-    T* right = level[k + 1].right.data();
-    backend.parallel_for("multigrid: restrict", level[k + 1].cells, [=] RINGLET_LAMBDA(int p) {
+    sum_children(backend, k + 1, level[k].residual.data());
+  }
+
+  // Level k's right side from values of the level before.
+  void sum_children(Backend& backend, int k, const T* fine) {
+    const std::int32_t* child = level[k].child.data();
+    T* right = level[k].right.data();
+    backend.parallel_for("multigrid: restrict", level[k].cells, [=] RINGLET_LAMBDA(int p) {
       T sum = T(0);
-      for (int i = child[p]; i < child[p + 1]; ++i) sum += residual[i];
+      for (int i = child[p]; i < child[p + 1]; ++i) sum += fine[i];
       right[p] = sum;
     });
+  }
+
+  // A projected step of Jacobi's.
+  void project(Backend& backend, int k) {
+    constexpr T kDamping = static_cast<T>(0.8);
+    const LatticeOperator<T> a = level[k].view();
+    const T* b = level[k].right.data();
+    T *x = level[k].x.data(), *y = level[k].y.data();
+    backend.parallel_for("multigrid: guess", a.cells, [=] RINGLET_LAMBDA(int i) {
+      y[i] = max(fma(kDamping, a.scaled(b[i] - a.apply(x, i), i), x[i]), T(0));
+    });
+    level[k].x.swap(level[k].y);
   }
 
   void find_residual(Backend& backend, int k) {

@@ -218,7 +218,7 @@ struct PairSearch {
   // What went past another by more than this share of its length may come to meet it with another segment
   // when it is put back: the next, or one farther on.
   static constexpr double kFar = 0.25;
-  static constexpr std::int32_t kMostAround = 4;
+  static constexpr std::int32_t kMostAround = 4, kAroundLater = 8;
 
   RINGLET_FUNCTION void add_around(const RankedPair& pair, T beyond, PairWriter& writer) const {
     const std::int32_t around = 1 + static_cast<std::int32_t>(min(T(kFar) * beyond, T(kMostAround - 1)));

@@ -6,7 +6,7 @@
 #pragma once
 #include <cstdint>
 
-#include "kernels/backend/qualifiers.h"
+#include "kernels/backend/words.h"
 
 namespace ringlet::kernels {
 
@@ -56,14 +56,6 @@ RINGLET_KERNEL int cell_in_tile(int x, int y, int z) {
 }
 RINGLET_KERNEL int coordinate_in_tile(int cell, int axis) {
   return (cell >> axis & 1) | (cell >> (axis + 3) & 1) << 1;
-}
-
-RINGLET_KERNEL int ones(std::uint64_t bits) {
-#if defined(__CUDA_ARCH__)
-  return __popcll(bits);
-#else
-  return __builtin_popcountll(bits);
-#endif
 }
 
 // Where a key stands in a sorted list, -1 where it does not.

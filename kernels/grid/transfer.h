@@ -227,15 +227,13 @@ template <class T, class Visit>
 RINGLET_FUNCTION void for_each_piece_of_tile(const GridData<T>& g, std::int32_t occupied,
                                              const Visit& visit) {
   for (std::int32_t q = g.tile_piece[occupied]; q < g.tile_piece[occupied + 1]; ++q) {
-#if !defined(__CUDA_ARCH__)
     constexpr int kAhead = 8;  // particles lie anywhere: they are on their way when their turn comes
     if (q + kAhead < g.pieces) {
       const TilePiece& later = g.tile_pieces[q + kAhead];
-      __builtin_prefetch(g.particle + static_cast<std::int64_t>(later.segment) * 8);
-      __builtin_prefetch(g.particle + static_cast<std::int64_t>(later.segment) * 8 + 15);
-      __builtin_prefetch(g.rest_density + later.rest);
+      prefetch(g.particle + static_cast<std::int64_t>(later.segment) * 8);
+      prefetch(g.particle + static_cast<std::int64_t>(later.segment) * 8 + 15);
+      prefetch(g.rest_density + later.rest);
     }
-#endif
     const TilePiece piece = g.tile_pieces[q];
     visit(piece, Segment<T>(g, piece.segment, piece.samples, piece.ends));
   }

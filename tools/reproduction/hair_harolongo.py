@@ -5,7 +5,7 @@ import numpy as np
 
 from . import pictures
 from .common import read_scene, scene_path
-from .density import volume
+from .density import over_target, volume
 
 SCENE = "real/harolongo"
 VARIANTS = {"off": None, "grid": {"grid": {}}, "grid and contacts": {"grid": {}, "contacts": {}}}
@@ -50,5 +50,6 @@ def numbers(run, volumes, name, shown):
         "volume_mean_cm3": volumes[name].mean(),
         "volume_last_cm3": volumes[name][-1],
         "volume_over_off": {"mean": over_off.mean(), "least": over_off.min(), "most": over_off.max()},
+        "over_target": over_target(run, run.frames[7::7]),  # by frame: the largest, share of the hair over 1.5
         "health": run.health(shown[1:], DEPTH),
     }

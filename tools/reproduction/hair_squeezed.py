@@ -75,7 +75,7 @@ def numbers(run, density):
         "largest_over_target_held": max(largest for largest, _ in held.values()),
         "share_of_hair_over_bound_held": max(share for _, share in held.values()),
         "flicker_p99_m": flicker(run),
-        "grid_iterations_worst": run.worst("grid_iterations"),
+        "grid_iterations_a_frame_worst": run.worst("grid_iterations"),
         "grid_residual_worst": run.worst("grid_residual"),
         "health": run.health(FRAMES[1:]),
     }

@@ -1,6 +1,7 @@
 ringlet_test(kernels ringlet::kernels ringlet::state ringlet::oracle)
 
-add_executable(bench_kernels ${CMAKE_CURRENT_LIST_DIR}/bench/bench_kernels.cpp)
+add_executable(bench_kernels ${CMAKE_CURRENT_LIST_DIR}/bench/bench_kernels.cpp
+                             ${CMAKE_CURRENT_LIST_DIR}/bench/bench_contacts.cpp)
 target_include_directories(bench_kernels PRIVATE ${CMAKE_CURRENT_LIST_DIR})
 target_link_libraries(bench_kernels PRIVATE ringlet::kernels ringlet::state ringlet::oracle ringlet_flags
                                             benchmark::benchmark)

@@ -157,6 +157,7 @@ class Strands final : public CudaStrands {
     shelter.share = shelter_.data();
     grid().shelter(shelter);
   }
+  std::size_t grid_bytes() const override { return grid_ ? grid_->bytes() : 0; }
 
   void download_figures(std::span<float> strands, std::span<float> contacts,
                         std::span<float> lengths) override {
@@ -174,7 +175,7 @@ class Strands final : public CudaStrands {
            shelter_.bytes() + front_.bytes() + rear_.bytes() + position_.bytes() + velocity_.bytes() +
            root_motion_.bytes() + root_points_.bytes() + skin_.bytes() + strand_figures_.bytes() +
            contact_figures_.bytes() + length_figures_.bytes() + scratch_begin_.bytes() + scratch_.bytes() +
-           solids_.bytes() + (grid_ ? grid_->bytes() : 0);
+           solids_.bytes() + grid_bytes();
   }
 
  private:

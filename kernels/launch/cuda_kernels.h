@@ -106,6 +106,7 @@ class CudaStrands {
   virtual void grid_at_rest(const GridStep<float>& step) = 0;
   virtual GridFigures grid_step(const GridStep<float>& step) = 0;
   virtual void grid_shelter(const HairShelter<float>& shelter) = 0;
+  virtual std::size_t grid_bytes() const = 0;  // of what `bytes` counts
 
   // Of the last step of each kind: [batches][kFigures], [batches][kContactFigures] and
   // [batches][kLengthFigures]; an empty span is left out.

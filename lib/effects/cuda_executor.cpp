@@ -40,7 +40,7 @@ class DeviceGrid : public kernels::HairGrid<float> {
   void shelter(const kernels::HairShelter<float>& shelter) override {
     on_device([&] { strands_.grid_shelter(shelter); });
   }
-  std::size_t bytes() const override { return 0; }  // the device's are counted with the strands
+  std::size_t bytes() const override { return strands_.grid_bytes(); }
 
  private:
   kernels::CudaStrands& strands_;

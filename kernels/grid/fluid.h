@@ -54,7 +54,7 @@ RINGLET_FUNCTION Opening<T> find_opening(const GridData<T>& g, const double* pla
       return (distance - static_cast<T>(solid.offset)) / static_cast<T>(g.step.axes.cell);
     };
     T share = min(max(cells(level.distance) + T(0.5), T(0)), T(1));
-    if (share < T(1) && above != below &&
+    if (above != below &&
         cells(BlendedSample<T>(solid, in_solid<T>(g.step.axes, solid, beyond)).distance) < T(kWallShare))
       share = T(0);
     if (!(share < opening.share)) continue;

@@ -36,6 +36,12 @@ class GridSolver final : public HairGrid<T> {
           "grid: rest density", samples_, kLeastStrands,
           [g = data_] RINGLET_LAMBDA(int s) { return static_cast<double>(g.rest_density[s]); });
     }
+    // What the first run will want is there before it: plans tell it.
+    data_.step.axes = step.axes;
+    fill();
+    find_fluid();
+    find_walls();
+    assemble();
   }
 
   GridFigures run(const GridStep<T>& step) override {

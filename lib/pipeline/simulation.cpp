@@ -119,6 +119,7 @@ class TypedSimulation : public Simulation {
     if (!scene_.effects.grooming.empty())
       grooming_.emplace(scene_, world_.simulated.groom_of_strand, model_, state_);
     if (grooming_ && scene_.frames.preroll == 0) rehearse_first_frame();
+    if (scene_.effects.hair_hair) start(), tell_rest();  // stages take their memory at rest
     make_plan();
   }
 

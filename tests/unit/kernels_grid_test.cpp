@@ -251,8 +251,7 @@ struct HairAtWall {
   double at;
   GridHair<T> hair;
 };
-// Not at the middles of cells, where rounding alone decides which of them are air.
-constexpr double kWallPlaces[] = {0, -kCell / 4, -0.55 * kCell, -0.75 * kCell};
+constexpr double kWallPlaces[] = {0, -kCell / 4, -kCell / 2, -0.55 * kCell, -0.75 * kCell};
 // [m/s] Fast beside what hair has to give before it is as dense as at rest, a cell in the interval at most.
 constexpr double kWallSpeed = 1;
 

@@ -43,6 +43,7 @@ class GridStage : public Stage<T> {
     state::StrandState<T> posed = rest;  // only read
     step.state = posed.view();
     step.root_points = rest.root_points.data();
+    step.solid_count = 0;  // they take no part in the rest state
     grid_->at_rest(step);
   }
 

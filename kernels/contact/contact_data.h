@@ -1,5 +1,6 @@
 // The plain arrays that the contacts of hair against hair work on.
 #pragma once
+#include "kernels/backend/atomic.h"
 #include "kernels/backend/lane_bits.h"
 #include "kernels/contact/contact_step.h"
 #include "kernels/contact/segment_pair.h"
@@ -74,15 +75,6 @@ RINGLET_KERNEL bool comes_first(const Place<T>* places, std::int32_t one, std::i
 RINGLET_KERNEL double summable(double a) {
   constexpr double kShift = 1.5 * 65536.0;  // 1.5 * 2^(52 - 36)
   return (a + kShift) - kShift;
-}
-
-template <class T>
-RINGLET_KERNEL T atomic_add(T* to, T value) {
-#if defined(__CUDA_ARCH__)
-  return atomicAdd(to, value);
-#else
-  return __atomic_fetch_add(to, value, __ATOMIC_RELAXED);
-#endif
 }
 
 }  // namespace RINGLET_ISA

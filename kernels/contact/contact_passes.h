@@ -27,10 +27,6 @@ struct ContactPairs {
   std::int32_t count;
 };
 
-struct ContactCounts {
-  long long contacts, crossings;
-};
-
 // Contacts as places are now. For a pack of pairs.
 template <class R>
 struct FindContacts {

@@ -24,8 +24,8 @@ struct MotionLattice {
 
 // Sums at one node.
 struct MotionSum {
-  long long displacement[3];  // in units of kMotionUnit
-  long long count;
+  std::int64_t displacement[3];  // in units of kMotionUnit
+  std::int64_t count;
 };
 inline constexpr double kMotionUnit = 1.0 / (1LL << 32);  // [m]
 

@@ -88,8 +88,8 @@ class Neighbours {
       MotionSum& sum = sums[lattice.number(node[0], node[1], node[2])];
       for (int c = 0; c < 3; ++c)
         atomic_add(&sum.displacement[c],
-                   static_cast<long long>(((&end.x)[c] - (&start.x)[c]) * (1 / kMotionUnit)));
-      atomic_add(&sum.count, 1LL);
+                   static_cast<std::int64_t>(((&end.x)[c] - (&start.x)[c]) * (1 / kMotionUnit)));
+      atomic_add(&sum.count, std::int64_t{1});
     });
     MotionNode* nodes = nodes_.data();
     backend.parallel_for("mean motion", lattice.total(),

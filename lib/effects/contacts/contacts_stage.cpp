@@ -63,6 +63,15 @@ class ContactsStage : public Stage<T> {
   }
   std::int64_t diverged_strand() const override { return lengths_.diverged_strand(); }
 
+  // Takes the memory that hair at rest asks for.
+  void at_rest(Executor<T>&, const state::StrandState<T>& rest) override {
+    start_ = rest.position, start_root_points_ = rest.root_points;
+    kernels::HairContactStep<T> step = contact_step();
+    step.state = {start_.data(), start_.data()};  // not changed, and velocities do not matter
+    step.root_points = start_root_points_.data();
+    contacts_.begin(step);
+  }
+
   // Contacts are found over all the way since here: since the frame began, or the substep.
   void begin(Executor<T>& executor, const Substep& substep) override {
     if (!substep.first_of_frame && !each_substep()) return;

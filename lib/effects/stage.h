@@ -33,12 +33,12 @@ struct FrameReport {
   // largest.
   double grid_solves = 0, grid_iterations = 0;  // of the pressure
   double grid_residual = 0;                     // that was left, relative to the right hand side [-]
-  double grid_density = 0;  // largest over its target before the frame's last correction [-]
-  double grid_cells = 0;                        // fluid cells of the largest solve
-  double contact_pairs = 0;                     // segments that were looked at, two by two
-  double contacts = 0;                          // those that touched
-  double contact_depth = 0;                     // largest overlap that was left [m]
-  double crossings = 0;                         // pairs that passed through one another and could not be held
+  double grid_density = 0;   // largest over its target before the frame's last correction [-]
+  double grid_cells = 0;     // fluid cells of the largest solve
+  double contact_pairs = 0;  // segments that were looked at, two by two
+  double contacts = 0;       // those that touched
+  double contact_depth = 0;  // largest overlap that was left [m]
+  double crossings = 0;      // pairs that passed through one another and could not be held
 };
 
 // A strand that left the limits or is no longer finite.

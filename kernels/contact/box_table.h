@@ -32,9 +32,11 @@ struct BoxLevels {
   BoxLevel level[kLevels];
   std::int32_t total_cells;
 
-  // Levels from the boxes' mean half size on.
-  RINGLET_FUNCTION static BoxLevels make(const float* low, const float* high, float mean_half_size) {
-    constexpr float kMostCells = 128;
+  // Levels from the boxes' mean half size on, each with not many more cells than there are boxes.
+  RINGLET_FUNCTION static BoxLevels make(const float* low, const float* high, float mean_half_size,
+                                         std::int32_t boxes) {
+    float most = 16;
+    while (most < 128 && most * most * most < 2 * static_cast<float>(boxes)) most *= 2;
     BoxLevels levels{};
     for (int k = 0; k < kLevels; ++k) {
       BoxLevel& level = levels.level[k];
@@ -44,7 +46,7 @@ struct BoxLevels {
       for (int c = 0; c < 3; ++c) {
         levels.low[c] = low[c];
         level.per_cell[c] = (c == 0 ? 2.0f : 1.0f) / level.half_size;
-        const float wanted = min((high[c] - low[c]) * level.per_cell[c], kMostCells);
+        const float wanted = min((high[c] - low[c]) * level.per_cell[c], most);
         for (level.cells[c] = 1; static_cast<float>(level.cells[c]) < wanted;) level.cells[c] *= 2;
         cells *= level.cells[c];
       }

@@ -57,21 +57,19 @@ class HairContacts {
   HairPlaces<T> places() const { return {start_.data(), end_.data()}; }
   std::int32_t packs() const { return (pairs_.count + kWidth - 1) / kWidth; }
 
-  // The middle of the root points' box, so that places are small numbers; [3].
+  // The mean of the root points, so that places are small numbers wherever one strand has got to; [3].
   void find_origin(const HairContactStep<T>& step, const double* points, double* origin) {
     const T* count = step.batches.count;
     const std::int32_t strands = step.batches.batches * kLanes;
+    const double there = backend_.sum(
+        "count strands", strands, [=] RINGLET_LAMBDA(std::int32_t s) { return count[s] > T(0) ? 1.0 : 0.0; });
     for (int c = 0; c < 3; ++c) {
-      const auto value = [=] RINGLET_LAMBDA(std::int32_t s) {
-        return points[(static_cast<std::int64_t>(s / kLanes) * 3 + c) * kLanes + s % kLanes];
-      };
-      const double high = backend_.largest("origin", strands, -1e30, [=] RINGLET_LAMBDA(std::int32_t s) {
-        return count[s] > T(0) ? value(s) : -1e30;
+      const double sum = backend_.sum("origin", strands, [=] RINGLET_LAMBDA(std::int32_t s) {
+        constexpr double kMicrometres = 1.5 * 4294967296.0;  // rounds as summable() does, to 2^-20
+        const double point = points[(static_cast<std::int64_t>(s / kLanes) * 3 + c) * kLanes + s % kLanes];
+        return count[s] > T(0) ? (point + kMicrometres) - kMicrometres : 0.0;
       });
-      const double low = -backend_.largest("origin", strands, -1e30, [=] RINGLET_LAMBDA(std::int32_t s) {
-        return count[s] > T(0) ? -value(s) : -1e30;
-      });
-      origin[c] = 0.5 * (low + high);
+      origin[c] = there > 0 ? sum / there : 0;
     }
   }
 

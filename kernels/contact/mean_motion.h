@@ -20,6 +20,13 @@ struct MotionLattice {
     return (z * nodes[1] + y) * nodes[0] + x;
   }
   RINGLET_KERNEL std::int32_t total() const { return nodes[0] * nodes[1] * nodes[2]; }
+  // The node nearest to a place along an axis; the first for what is not a number.
+  RINGLET_KERNEL std::int32_t nearest(int axis, float x) const {
+    const float place = (x - low[axis]) * per_cell + 0.5f;
+    if (!(place >= 1)) return 0;
+    const auto last = static_cast<float>(nodes[axis] - 1);
+    return place < last ? static_cast<std::int32_t>(place) : nodes[axis] - 1;
+  }
 };
 
 // Sums at one node.

@@ -82,9 +82,7 @@ class Neighbours {
       if (strand[p] < 0) return;
       const Place<T>&end = places.end[p], &start = places.start[p];
       std::int32_t node[3];
-      for (int c = 0; c < 3; ++c)
-        node[c] = static_cast<std::int32_t>(
-            (static_cast<float>((&end.x)[c]) - lattice.low[c]) * lattice.per_cell + 0.5f);
+      for (int c = 0; c < 3; ++c) node[c] = lattice.nearest(c, static_cast<float>((&end.x)[c]));
       MotionSum& sum = sums[lattice.number(node[0], node[1], node[2])];
       for (int c = 0; c < 3; ++c)
         atomic_add(&sum.displacement[c],
@@ -178,7 +176,8 @@ class Neighbours {
         [=] RINGLET_LAMBDA(std::int32_t p, int c) { return 0.5f * (boxes[p].low[c] + boxes[p].high[c]); },
         low, high);
     table_.boxes = static_cast<std::int32_t>(segments);
-    table_.levels = BoxLevels::make(low, high, static_cast<float>(sizes / (segments > 0 ? segments : 1)));
+    table_.levels =
+        BoxLevels::make(low, high, static_cast<float>(sizes / (segments > 0 ? segments : 1)), table_.boxes);
     sort_boxes(backend, strand, particles);
     order_cells(backend, places);
     gather_boxes(backend, places, strand);

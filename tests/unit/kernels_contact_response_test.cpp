@@ -212,6 +212,24 @@ TYPED_TEST(ContactResponse, RootsAreObstaclesThatDoNotMove) {
   EXPECT_GT(run.position(1, 2).y(), 0);
 }
 
+TYPED_TEST(ContactResponse, AStrandFarAwayChangesNothingHere) {
+  const auto contacts_with = [&](const std::vector<HairStrand>& more) {
+    auto strands = this->tangle(200);
+    strands.insert(strands.end(), more.begin(), more.end());
+    HairRun<TypeParam> run(strands, kRadius, 0);
+    this->fly(run);
+    const HairContactFigures found = this->one_pass(run);
+    EXPECT_LT(run.contacts.bytes(), 20u << 20);
+    return static_cast<double>(found.contacts);
+  };
+  const double alone = contacts_with({});
+  const HairStrand lost = straight_strand(Vec3(300, -500, 100), Vec3(0.01, 0, 0), 5, Vec3(900, 0, 0));
+  EXPECT_NEAR(contacts_with({lost}), alone, 0.01 * alone);
+  HairStrand broken = lost;
+  broken.points[2].y() = std::nan("");
+  EXPECT_NEAR(contacts_with({broken}), alone, 0.01 * alone);
+}
+
 TYPED_TEST(ContactResponse, AThingThatMovesAsAWholeIsLeftAlone) {
   // At 30 m/s, turning by a third of a revolution a frame.
   HairRun<TypeParam> run(this->tangle(60), kRadius, 0);

@@ -1,6 +1,7 @@
 """scenes/hair_hair: they load, plan and run; their files are what the tool makes; and what the figures count by is
 right about strands whose way is known."""
 import json
+import re
 import subprocess
 import sys
 from types import SimpleNamespace
@@ -142,3 +143,45 @@ def test_volume_is_counted_on_the_heads_axes():
     assert still == pytest.approx(0.02 * 0.02 * 0.3, rel=0.2)
     assert turned == pytest.approx(still, rel=0.02)
     assert pressed < 0.65 * still
+
+
+# ---- The document ------------------------------------------------------------------------------------------------
+
+
+def told(label):
+    """The numbers of a row of docs/reproduction.md."""
+    text = (SOURCE / "docs/reproduction.md").read_text()
+    row = re.search(rf"^\| {re.escape(label)} \|(.*)\|$", text, re.MULTILINE)[1]
+    return [float(cell.strip(" %cm")) for cell in row.split("|")]
+
+
+def figure(name):
+    return json.loads((SOURCE / f"docs/figures/{name}.json").read_text())
+
+
+@pytest.mark.parametrize(
+    "label, name",
+    [
+        ("grid once a frame", "once a frame"),
+        ("each substep", "each substep"),
+        ("each substep, 4 passes (the scene)", "each substep, 4 passes"),
+    ],
+)
+def test_the_densities_told_are_those_measured(label, name):
+    measured = figure("hair_squeezed")[name]
+    values = [measured["largest_over_target_held"], 100 * measured["share_of_hair_over_bound_held"]]
+    assert told(label) == pytest.approx([*values, measured["health"]["core_ms_per_frame"]], rel=0.05)
+
+
+def test_the_scenes_density_is_within_its_bound():
+    with_grid, off = (figure("hair_squeezed")[name] for name in ("each substep, 4 passes", "off"))
+    assert with_grid["largest_over_target_held"] <= 1.5 < off["largest_over_target_held"]
+
+
+@pytest.mark.parametrize("scene", ["wind", "wig"])
+@pytest.mark.parametrize("name", ["off", "grid", "grid, shelter"])
+def test_what_the_grid_changes_is_told_as_measured(scene, name):
+    measured = figure("hair_paper")[scene][name]
+    centimetres = 100 * measured["tips_downwind_m"]["median"]
+    values = measured["least_volume_over_first"], centimetres, measured["core_ms_per_frame"]
+    assert told(f"{scene}, {name.replace(', ', ' with ')}") == pytest.approx(values, rel=0.03)

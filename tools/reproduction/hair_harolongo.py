@@ -51,5 +51,5 @@ def numbers(run, volumes, name, shown):
         "volume_last_cm3": volumes[name][-1],
         "volume_over_off": {"mean": over_off.mean(), "least": over_off.min(), "most": over_off.max()},
         "over_target": over_target(run, run.frames[7::7]),  # by frame: the largest, share of the hair over 1.5
-        "health": run.health(shown[1:], DEPTH),
+        "health": run.health(shown[1:], DEPTH) | {"inside_depth_m": DEPTH / 100},
     }

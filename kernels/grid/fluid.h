@@ -72,6 +72,7 @@ RINGLET_FUNCTION void find_openings(const GridData<T>& g, std::int32_t tile, int
   const bool above = fluid_cell(g, node) >= 0;
   for (int axis = 0; axis < 3; ++axis) {
     const bool below = fluid_cell(g, next_node(g, node, axis, -1)) >= 0;
+    to[axis] = T(1), to[3 + axis] = T(0);
     if (!above && !below) continue;
     double place[3];
     for (int c = 0; c < 3; ++c)
@@ -128,27 +129,30 @@ struct CellRow {
 
   RINGLET_FUNCTION CellRow(const GridData<T>& g, std::int64_t node, std::int32_t number) {
     for (int axis = 0; axis < 3; ++axis) {
-      const std::int64_t high = next_node(g, node, axis, 1);
+      const std::int64_t high = next_node(g, node, axis, 1);  // none where no hair reaches
       const T below = velocity(g, node, axis), beyond = velocity(g, high, axis);
       const bool hair_below = mass(g, node, axis) > T(0), hair_beyond = mass(g, high, axis) > T(0);
       // Where a face has no hair nothing crosses it faster than the other side.
       add(g, node, axis, 2 * axis, next_node(g, node, axis, -1), number, -(hair_below ? below : beyond));
-      add(g, high, axis, 2 * axis + 1, high, number, hair_beyond ? beyond : below);
+      add(g, high, axis, 2 * axis + 1, high, number, hair_beyond ? beyond : below,
+          hair_below ? T(1) / (static_cast<T>(kLeastFaceShare) * mass(g, node, axis)) : T(0));
     }
   }
 
  private:
   RINGLET_FUNCTION static T mass(const GridData<T>& g, std::int64_t node, int axis) {
-    return g.node[node * kNodeValues + kFaceMass + 2 * axis];
+    return node < 0 ? T(0) : g.node[node * kNodeValues + kFaceMass + 2 * axis];
   }
   RINGLET_FUNCTION static T velocity(const GridData<T>& g, std::int64_t node, int axis) {
-    return g.node[node * kNodeValues + kFaceMass + 2 * axis + 1];
+    return node < 0 ? T(0) : g.node[node * kNodeValues + kFaceMass + 2 * axis + 1];
   }
   // `outward`: the hair's velocity out of the cell through this face.
   RINGLET_FUNCTION void add(const GridData<T>& g, std::int64_t face_node, int axis, int direction,
-                            std::int64_t beside, std::int32_t number, T outward) {
-    const Opening<T> opening = opening_of(g, face_node, axis);
-    const T c = opening.share * g.lightness[face_node * 3 + axis];
+                            std::int64_t beside, std::int32_t number, T outward, T lightness_across = T(0)) {
+    // A face that no hair reaches weighs what a face weighs at least.
+    const bool reached = face_node >= 0;
+    const Opening<T> opening = reached ? opening_of(g, face_node, axis) : Opening<T>{T(1), T(0)};
+    const T c = reached ? opening.share * g.lightness[face_node * 3 + axis] : lightness_across;
     const std::int32_t other = fluid_cell(g, beside);
     neighbour[direction] = other < 0 ? number : other;
     face[direction] = other < 0 ? T(0) : c;

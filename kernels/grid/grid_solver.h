@@ -244,15 +244,15 @@ class GridSolver final : public HairGrid<T> {
     around_key_.resize(candidates), around_.resize(candidates);
     std::uint64_t* around = around_key_.data();
     const std::uint64_t* occupied = occupied_key_.data();
-    backend_.parallel_for("grid: dilate", candidates, [=] RINGLET_LAMBDA(int n) {
-      std::uint64_t key = occupied[n / kAround];
-      int place = n % kAround;
-      for (int axis = 0; axis < 3; ++axis, place /= 3) {
-        if (place % 3 == 0) key = key_before(key, axis);
-        if (place % 3 == 2) key = key_after(key, axis);
-      }
-      around[n] = key;
-    });
+    // One that is not reached is the tile itself, again.
+    backend_.parallel_for(
+        "grid: dilate", data_.occupied,
+        [g = data_, around, occupied] RINGLET_LAMBDA(int t) {
+          const std::uint32_t reached = tiles_reached(g, t);
+          for (int n = 0; n < kAround; ++n)
+            around[t * kAround + n] = reached >> n & 1 ? key_around(occupied[t], n) : occupied[t];
+        },
+        kTileChunk);
     backend_.sort("grid: dilate", around_key_, around_, candidates, bits);
     tile_key_.resize(candidates);
     data_.tiles = unique(around_key_.data(), candidates, tile_key_, nullptr);
@@ -487,7 +487,7 @@ class GridSolver final : public HairGrid<T> {
     const PressureFigures told = pressure_.solve(backend_, data_.step.residual, data_.step.most_iterations);
     figures.iterations += told.iterations;
     figures.residual = told.residual > figures.residual ? told.residual : figures.residual;
-    figures.solves += told.iterations > 0 ? 1 : 0;
+    figures.solves += told.compressed ? 1 : 0;
   }
 
   void give_back_all(bool moved) {

@@ -83,7 +83,9 @@ RINGLET_FUNCTION double depth_at(const GridData<T>& g, const TileShelter<T>& she
       if (n >> c & 1) around += towards[c] * stride;
       share *= n >> c & 1 ? weight[c] : 1 - weight[c];
     }
-    const std::int32_t other = g.near[static_cast<std::int64_t>(tile) * kAround + around];
+    // By its key: a segment's middle may lie in a tile that holds no sample, whose corners nobody has looked
+    // up.
+    const std::int32_t other = find_key(g.tile_key, g.tiles, key_around(g.tile_key[tile], around));
     depth += share * static_cast<double>(shelter.tile_depth[other < 0 ? tile : other]);
   }
   return depth;

@@ -17,9 +17,10 @@
 namespace ringlet::kernels {
 
 struct PressureFigures {
-  int iterations = 0;   // of conjugate gradients, over all sets
-  int sets = 0;         // that were solved on
-  double residual = 0;  // relative, left
+  int iterations = 0;       // of conjugate gradients, over all sets
+  int sets = 0;             // that were solved on
+  double residual = 0;      // relative, left
+  bool compressed = false;  // there was something to do
 };
 
 inline namespace RINGLET_ISA {
@@ -54,7 +55,8 @@ struct Pressure {
 
     const double compressed = find_violation(backend);
     double left = compressed, along = 0;
-    if (compressed > 0) left = guess(backend);
+    figures.compressed = compressed > 0;
+    if (figures.compressed) left = guess(backend);
     while (left > tolerance * tolerance * compressed && figures.iterations < most_iterations) {
       if (choose_set(backend)) ++figures.sets, along = 0;
       multigrid.cycle(backend);

@@ -156,34 +156,6 @@ struct SampleWeights {
   };
 };
 
-// The tiles across a tile's faces.
-template <class T>
-RINGLET_FUNCTION void find_near(const GridData<T>& g, std::int32_t tile) {
-  std::int32_t* near = g.near + static_cast<std::int64_t>(tile) * kAround + kAround / 2;
-  near[0] = tile;
-  for (int axis = 0, stride = 1; axis < 3; ++axis, stride *= 3) {
-    near[-stride] = find_key(g.tile_key, g.tiles, key_before(g.tile_key[tile], axis));
-    near[stride] = find_key(g.tile_key, g.tiles, key_after(g.tile_key[tile], axis));
-  }
-}
-
-// Those across an occupied tile's edges and corners: all are there, so that one leads to another.
-template <class T>
-RINGLET_FUNCTION void find_around(const GridData<T>& g, std::int32_t occupied) {
-  const std::int32_t own = g.occupied_tile[occupied];
-  const auto beside = [&](std::int32_t tile, int stride, int side) {
-    return g.near[static_cast<std::int64_t>(tile) * kAround + kAround / 2 + stride * (side - 1)];
-  };
-  for (int n = 0; n < kAround; ++n) {
-    const int x = n % 3, y = n / 3 % 3, z = n / 9;
-    if ((x != 1) + (y != 1) + (z != 1) < 2) continue;
-    std::int32_t tile = z == 1 ? own : beside(own, 9, z);
-    if (y != 1) tile = beside(tile, 3, y);
-    if (x != 1) tile = beside(tile, 1, x);
-    g.near[static_cast<std::int64_t>(own) * kAround + n] = tile;
-  }
-}
-
 // A tile's lowest corner, from the lowest tile's [cells].
 template <class T>
 RINGLET_FUNCTION void tile_corner(const GridData<T>& g, std::int32_t tile, std::int32_t* corner) {
@@ -237,6 +209,66 @@ RINGLET_FUNCTION void for_each_piece_of_tile(const GridData<T>& g, std::int32_t 
     const TilePiece piece = g.tile_pieces[q];
     visit(piece, Segment<T>(g, piece.segment, piece.samples, piece.ends));
   }
+}
+
+// The key of the n-th tile about a tile.
+RINGLET_FUNCTION std::uint64_t key_around(std::uint64_t key, int n) {
+  for (int axis = 0; axis < 3; ++axis, n /= 3) {
+    if (n % 3 == 0) key = key_before(key, axis);
+    if (n % 3 == 2) key = key_after(key, axis);
+  }
+  return key;
+}
+
+// Which of the tiles about an occupied tile its samples reach, a bit for each: those beside the cells they
+// lie in.
+template <class T>
+RINGLET_FUNCTION std::uint32_t tiles_reached(const GridData<T>& g, std::int32_t occupied) {
+  std::uint32_t reached = 0;
+  for_each_piece_of_tile(g, occupied, [&](const TilePiece& piece, const Segment<T>& segment) {
+    for (std::int32_t s = piece.first; s < piece.end; ++s) {
+      const Octet<T> place = segment.place(segment.parameter(s));
+      int corner = 0;  // the tile that the sample is nearest to along each axis, as a number about the tile
+      for (int c = 2; c >= 0; --c) {
+        const int within = static_cast<std::int32_t>(place.v[c]) & (kTileEdge - 1);
+        corner = 3 * corner + (within == 0 ? 0 : within == kTileEdge - 1 ? 2 : 1);
+      }
+      reached |= 1u << corner;
+    }
+  });
+  // What reaches a corner reaches its edges and faces.
+  for (int axis = 0, stride = 1; axis < 3; ++axis, stride *= 3)
+    for (int n = 0; n < kAround; ++n)
+      if (n / stride % 3 != 1 && (reached >> n & 1)) reached |= 1u << (n + stride * (1 - n / stride % 3));
+  return reached;
+}
+
+// The tiles across a tile's faces.
+template <class T>
+RINGLET_FUNCTION void find_near(const GridData<T>& g, std::int32_t tile) {
+  std::int32_t* near = g.near + static_cast<std::int64_t>(tile) * kAround + kAround / 2;
+  near[0] = tile;
+  for (int axis = 0, stride = 1; axis < 3; ++axis, stride *= 3) {
+    near[-stride] = find_key(g.tile_key, g.tiles, key_before(g.tile_key[tile], axis));
+    near[stride] = find_key(g.tile_key, g.tiles, key_after(g.tile_key[tile], axis));
+  }
+}
+
+// Those across an occupied tile's edges, then its corners: by way of the one before where there is one.
+template <class T>
+RINGLET_FUNCTION void find_around(const GridData<T>& g, std::int32_t occupied) {
+  const std::int32_t own = g.occupied_tile[occupied];
+  std::int32_t* near = g.near + static_cast<std::int64_t>(own) * kAround;
+  for (int aside = 2; aside <= 3; ++aside)
+    for (int n = 0; n < kAround; ++n) {
+      const int x = n % 3, y = n / 3 % 3, z = n / 9;
+      if ((x != 1) + (y != 1) + (z != 1) != aside) continue;
+      const int stride = z != 1 ? 9 : 3, side = z != 1 ? z - 1 : y - 1;
+      const std::int32_t beside = near[n - stride * side];
+      near[n] = beside >= 0
+                    ? g.near[static_cast<std::int64_t>(beside) * kAround + kAround / 2 + stride * side]
+                    : find_key(g.tile_key, g.tiles, key_around(g.tile_key[own], n));
+    }
 }
 
 // ---- Onto the nodes
@@ -335,6 +367,7 @@ RINGLET_FUNCTION void gather_tile(const GridData<T>& g, std::int32_t occupied) {
   std::int32_t corner[3];
   tile_corner(g, tile, corner);
   alignas(64) T values[kHaloNodes * kNodeValues];
+  for (int n = 0; n < kHaloNodes * kNodeValues; ++n) values[n] = T(0);
   for_each_halo_node(g, tile, [&](int halo, std::int64_t node) {
     Octet<T>::load(g.node + node * kNodeValues).store(values + halo * kNodeValues);
   });

@@ -1,8 +1,11 @@
 #include "effects/grid/grid_stage.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
+#include "core/log.h"
 #include "effects/grid/moving_axes.h"
 #include "effects/lengths.h"
 #include "kernels/launch/hair_grid.h"
@@ -62,6 +65,12 @@ class GridStage : public Stage<T> {
       diverged_ = lengths_.diverged_strand();
     }
     gather(figures, report);
+    if (figures.residual > options_.residual && !told_)
+      log_info(fmt::format(
+          "frame {}: the grid's pressure has a residual of {:.2g} left after {} iterations, asked "
+          "for {:.2g}: more max_iterations would do",
+          substep.frame, figures.residual, options_.max_iterations, options_.residual));
+    told_ = told_ || figures.residual > options_.residual;
   }
 
  private:
@@ -111,6 +120,7 @@ class GridStage : public Stage<T> {
   std::unique_ptr<kernels::HairGrid<T>> grid_;
   double cell_ = 1;  // [m]
   std::int64_t diverged_ = -1;
+  bool told_ = false;  // that a residual was left
 };
 
 }  // namespace

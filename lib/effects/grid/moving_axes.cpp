@@ -26,6 +26,16 @@ Mat3 nearest_rotation(const Mat3& m) {
   return u * svd.matrixV().transpose();
 }
 
+template <class T>
+Vec3 lowest_root(const state::StrandLayout& layout, const state::StrandState<T>& state) {
+  Eigen::AlignedBox3d box;
+  for (std::size_t s = 0; s < layout.strands(); ++s)
+    box.extend(Vec3(state.root_points[layout.at_strand(s, 3, 0)],
+                    state.root_points[layout.at_strand(s, 3, 1)],
+                    state.root_points[layout.at_strand(s, 3, 2)]));
+  return box.isEmpty() ? Vec3(Vec3::Zero()) : box.min();
+}
+
 using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
 }  // namespace
@@ -34,6 +44,7 @@ template <class T>
 kernels::GridAxes moving_axes(const state::StrandModel<T>& model, const state::StrandState<T>& state,
                               double cell, double substep) {
   const state::StrandLayout& layout = model.layout;
+  const Vec3 low = lowest_root(layout, state);  // sums from there stay small wherever the scene lies
   Mean before[9], after[9], place[3], way[3];
   for (std::size_t s = 0; s < layout.strands(); ++s) {
     const auto motion = [&](int value) {
@@ -41,7 +52,7 @@ kernels::GridAxes moving_axes(const state::StrandModel<T>& model, const state::S
     };
     for (int k = 0; k < 9; ++k) before[k].add(motion(k)), after[k].add(motion(k) + motion(9 + k));
     for (int c = 0; c < 3; ++c)
-      place[c].add(state.root_points[layout.at_strand(s, 3, c)]), way[c].add(motion(18 + c));
+      place[c].add(state.root_points[layout.at_strand(s, 3, c)] - low[c]), way[c].add(motion(18 + c));
   }
   RowMajor from, to;
   for (int k = 0; k < 9; ++k) from.data()[k] = before[k].value(), to.data()[k] = after[k].value();
@@ -50,7 +61,8 @@ kernels::GridAxes moving_axes(const state::StrandModel<T>& model, const state::S
   Eigen::Map<RowMajor>(axes.rotation) = end;
   // By backward differences, as the strands' velocities are.
   Eigen::Map<RowMajor>(axes.slope) = (end - start) * end.transpose() / substep;
-  for (int c = 0; c < 3; ++c) axes.origin[c] = place[c].value(), axes.velocity[c] = way[c].value() / substep;
+  for (int c = 0; c < 3; ++c)
+    axes.origin[c] = low[c] + place[c].value(), axes.velocity[c] = way[c].value() / substep;
   axes.cell = cell;
   return axes;
 }

@@ -1,15 +1,13 @@
 """Motion at 1, 3 and 10 times its speed: the roller-coaster (at ten times 620 g and 190 m/s) and the default scene's
 head, which turns to and fro. Runs end, lengths and speeds stay bounded, hair comes to rest once the motion stops."""
-import json
 
 import numpy as np
 import pytest
 
-from conftest import SOURCE
-from reproduction.common import run_scene
+from reproduction.common import read_scene, run_scene
 
 SPEEDS = (1, 3, 10)
-RIDE, TURN = "roller_coaster", "../quickstart"  # scenes, as seen from scenes/paper
+RIDE, TURN = "roller_coaster", "./quickstart"  # one of scenes/paper, one of scenes
 STRANDS = {RIDE: 48, TURN: 112}
 AFTER = {RIDE: 216, TURN: 120}  # frames after the motion's end; torn hair swings freely, its speed halves in 2 s
 MODELS = {"ams": {}, "paper": {"/model/scheme": "paper"}, "mass_spring": {"/model/type": "mass_spring"}}
@@ -37,7 +35,7 @@ def fast(program, tmp_path_factory):
 
 def last_key(scene):
     """The frame in which the scene's motion ends, at its own speed."""
-    text = json.loads((SOURCE / "scenes/paper" / f"{scene}.json").read_text())
+    text = read_scene(scene)
     return (text.get("motion") or text["head"]["animation"])["keys"][-1]["frame"]
 
 

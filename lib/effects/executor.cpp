@@ -5,6 +5,7 @@
 #include <tbb/parallel_for.h>
 
 #include "core/error.h"
+#include "effects/host_threads.h"
 #include "kernels/launch/hair_grid.h"
 #include "kernels/launch/launch.h"
 
@@ -20,10 +21,6 @@ InstructionSet choose(const std::string& name) {
     if (set <= best && name == kernels::name_of(set)) return set;
   throw Error(ErrorKind::kUsage, "", "this processor has no instruction set `" + name + "`",
               std::string("its widest is ") + kernels::name_of(best));
-}
-
-void run_chunks(void*, int chunks, void (*body)(const void* context, int chunk), const void* context) {
-  tbb::parallel_for(0, chunks, [=](int chunk) { body(context, chunk); });
 }
 
 // Strands are independent: batches in any order on any thread give the same bits.
@@ -47,7 +44,7 @@ class CpuExecutor : public Executor<T> {
   void shelter_step(const kernels::ShelterStep<T>& step) override { run(kernels_.shelter_step, step); }
   void length_step(const kernels::LengthStep<T>& step) override { run(kernels_.length_step, step); }
   std::unique_ptr<kernels::HairGrid<T>> make_hair_grid() override {
-    return kernels::make_hair_grid<T>(set_, {run_chunks, nullptr});
+    return kernels::make_hair_grid<T>(set_, host_threads());
   }
 
  private:

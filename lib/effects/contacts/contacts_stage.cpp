@@ -1,25 +1,20 @@
 #include "effects/contacts/contacts_stage.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 
+#include "effects/host_threads.h"
 #include "effects/lengths.h"
 #include "kernels/launch/contacts.h"
 
 namespace ringlet::effects {
 namespace {
 
-void run_chunks(void*, int chunks, void (*body)(const void* context, int chunk), const void* context) {
-  tbb::parallel_for(0, chunks, [=](int chunk) { body(context, chunk); });
-}
-
 // The kernels' memory.
 template <class T>
 class Contacts {
  public:
   explicit Contacts(kernels::InstructionSet set)
-      : table_(kernels::cpu_hair_contacts<T>(set)), memory_(table_.make({run_chunks, nullptr})) {}
+      : table_(kernels::cpu_hair_contacts<T>(set)), memory_(table_.make(host_threads())) {}
   ~Contacts() { table_.destroy(memory_); }
   Contacts(const Contacts&) = delete;
   Contacts& operator=(const Contacts&) = delete;

@@ -41,7 +41,7 @@ class GridStage : public Stage<T> {
     grid_ = executor.make_hair_grid();  // the executor may be another than before
     const double side = longest_side(model_, rest, moving_axes(model_, rest, 1, 1));
     cell_ = side > 0 ? side / options_.resolution : 1;
-    kernels::GridStep<T> step = step_of(scene_.model.substeps / scene_.frames.fps);
+    kernels::GridStep<T> step = step_of(1 / (scene_.frames.fps * scene_.model.substeps));
     step.axes = moving_axes(model_, rest, cell_, step.substep);
     state::StrandState<T> posed = rest;  // only read
     step.state = posed.view();

@@ -66,9 +66,27 @@ struct Octet {
 template <int kLanesOfA, class T>
 RINGLET_KERNEL Octet<T> choose(const Octet<T>& a, const Octet<T>& b) {
   Octet<T> result;
+#if defined(__CUDACC__)
   RINGLET_UNROLL
   for (int k = 0; k < 8; ++k) result.v[k] = kLanesOfA >> k & 1 ? a.v[k] : b.v[k];
+#else  // one instruction: lane by lane, GCC takes one for each
+  constexpr auto from = [](int k) { return kLanesOfA >> k & 1 ? k : k + 8; };
+  result.v = __builtin_shufflevector(a.v, b.v, from(0), from(1), from(2), from(3), from(4), from(5), from(6),
+                                     from(7));
+#endif
   return result;
+}
+
+// Lane k in all lanes.
+template <int k, class T>
+RINGLET_KERNEL Octet<T> spread(const Octet<T>& a) {
+#if defined(__CUDACC__)
+  return Octet<T>(a.v[k]);
+#else
+  Octet<T> result;
+  result.v = __builtin_shufflevector(a.v, a.v, k, k, k, k, k, k, k, k);
+  return result;
+#endif
 }
 
 // max(a, 0)
@@ -84,6 +102,18 @@ RINGLET_KERNEL Octet<T> positive(const Octet<T>& a) {
   return result;
 }
 
+// Towards zero; what does not fit is anything.
+template <class T>
+RINGLET_KERNEL Octet<std::int32_t> truncated(const Octet<T>& a) {
+  Octet<std::int32_t> result;
+#if defined(__CUDACC__)
+  RINGLET_UNROLL
+  for (int k = 0; k < 8; ++k) result.v[k] = static_cast<std::int32_t>(a.v[k]);
+#else
+  result.v = __builtin_convertvector(a.v, Octet<std::int32_t>::Vector);
+#endif
+  return result;
+}
 template <class T, class I>
 RINGLET_KERNEL Octet<T> to_real(const Octet<I>& a) {
   Octet<T> result;

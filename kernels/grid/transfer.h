@@ -128,32 +128,22 @@ struct SampleWeights {
 
   // `place` in cells; `low`: the tile's corner.
   RINGLET_KERNEL SampleWeights(const std::int32_t* low, const Octet<T>& place) {
-    std::int32_t at[3];
-    Octet<T> within = place;
-    RINGLET_UNROLL
-    for (int c = 0; c < 3; ++c) {
-      at[c] = static_cast<std::int32_t>(place.v[c]);
-      within.v[c] = place.v[c] - static_cast<T>(at[c]);
-    }
-    corner = ((at[2] - low[2]) * kHaloEdge + (at[1] - low[1])) * kHaloEdge + (at[0] - low[0]);
-    const Octet<T> half(T(0.5)), one(T(1));
-    const Octet<T> before = positive(half - within), after = positive(within - half);
-    const Octet<T> middle = one - before - after, face = one - within;
-    const auto set = [&](auto axis, Octet<T>* w) {
-      constexpr int kAxis = decltype(axis)::kValue, kFace = kFaceLanes<kAxis>;
-      w[0] = choose<kFace>(Octet<T>(T(0)), Octet<T>(before.v[kAxis]));
-      w[1] = choose<kFace>(Octet<T>(face.v[kAxis]), Octet<T>(middle.v[kAxis]));
-      w[2] = choose<kFace>(Octet<T>(within.v[kAxis]), Octet<T>(after.v[kAxis]));
-    };
-    set(Axis<0>{}, x), set(Axis<1>{}, y), set(Axis<2>{}, z);
+    const Octet<std::int32_t> at = truncated(place);
+    const Octet<T> within = place - to_real<T>(at);
+    corner = ((at.v[2] - low[2]) * kHaloEdge + (at.v[1] - low[1])) * kHaloEdge + (at.v[0] - low[0]);
+    set<kFaceLanes<0>>(x, spread<0>(within));
+    set<kFaceLanes<1>>(y, spread<1>(within));
+    set<kFaceLanes<2>>(z, spread<2>(within));
   }
   RINGLET_KERNEL int node(int j, int k) const { return corner + (k * kHaloEdge + j) * kHaloEdge; }
 
  private:
-  template <int kAxis>
-  struct Axis {
-    static constexpr int kValue = kAxis;
-  };
+  template <int kFace>
+  RINGLET_KERNEL static void set(Octet<T>* w, const Octet<T>& within) {
+    const Octet<T> zero(T(0)), beyond = within - choose<kFace>(zero, Octet<T>(T(0.5)));
+    w[0] = positive(zero - beyond), w[2] = positive(beyond);
+    w[1] = Octet<T>(T(1)) - w[0] - w[2];
+  }
 };
 
 // A tile's lowest corner, from the lowest tile's [cells].
@@ -301,12 +291,14 @@ RINGLET_FUNCTION void scatter_tile(const GridData<T>& g, std::int32_t occupied) 
   for (int n = 0; n < kHaloNodes * kNodeValues; ++n) sums[n] = 0;
   for_each_piece_of_tile(g, occupied, [&](const TilePiece& piece, const Segment<T>& segment) {
     const T* rest = g.rest_density + (piece.rest - piece.first);
-    const T length = segment.sample_length();
+    constexpr int kMomenta = 1 << 3 | 1 << 5 | 1 << 7;  // where a particle has its velocity
+    const Octet<T> one(T(1)), length(segment.sample_length());
+    const Octet<T> first = choose<kMomenta>(segment.a, one), second = choose<kMomenta>(segment.b, one);
     for (std::int32_t s = piece.first; s < piece.end; ++s) {
       const T t = segment.parameter(s), a = (T(1) - t) * segment.share_a, b = t * segment.share_b;
-      constexpr int kMomenta = 1 << 3 | 1 << 5 | 1 << 7;  // where a particle has its velocity
-      Octet<T> value = choose<kMomenta>(Octet<T>(a) * segment.a + Octet<T>(b) * segment.b, Octet<T>(a + b));
-      value.v[kDensity] = length, value.v[kTarget] = length * rest[s];
+      const Octet<T> hair = length * choose<1 << kTarget>(Octet<T>(rest[s]), one);
+      const Octet<T> moved = Octet<T>(a) * first + Octet<T>(b) * second;
+      const Octet<T> value = choose<1 << kDensity | 1 << kTarget>(hair, moved);
       add_sample(SampleWeights<T>(corner, segment.place(t)), value * scale, sums);
     }
   });

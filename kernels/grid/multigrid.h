@@ -78,6 +78,7 @@ struct Level {
 template <class T>
 struct Coarsening {
   LatticeOperator<T> fine;
+  const std::uint64_t* key;  // of the fine cells
   const std::int32_t *parent, *child;
   std::int32_t coarse_cells;
   std::int32_t* neighbour;
@@ -97,12 +98,13 @@ struct Coarsening {
     T own = T(0), across[kDirections] = {};
     for (int i = child[p]; i < child[p + 1]; ++i) {
       own += fine.diagonal[i];
-      for (int d = 0; d < kDirections; ++d) {
-        const std::int64_t at = static_cast<std::int64_t>(d) * fine.cells + i;
-        if (parent[fine.neighbour[at]] == p)
-          own -= fine.link[at];
-        else
-          across[d] += fine.link[at];
+      RINGLET_UNROLL
+      for (int axis = 0; axis < 3; ++axis) {
+        const std::int64_t at = std::int64_t{2} * axis * fine.cells + i;
+        const T low = fine.link[at], high = fine.link[at + fine.cells];
+        const bool upper = key[i] >> axis & 1;  // of the two cells along the axis: its low link is within
+        own -= select(upper, low, high);
+        across[2 * axis] += select(upper, T(0), low), across[2 * axis + 1] += select(upper, high, T(0));
       }
     }
     // Cells within a wall all round are tied to nothing: what is left of their sum is rounding.
@@ -219,9 +221,8 @@ struct Multigrid {
 
   Coarsening<T> coarsening(int k) const {
     const Level<Backend, T>&fine = level[k - 1], &coarse = level[k];
-    return {fine.view(),           fine.parent.data(),      coarse.child.data(),
-            coarse.cells,          coarse.neighbour.data(), coarse.link.data(),
-            coarse.diagonal.data()};
+    return {fine.view(),  fine.key.data(),         fine.parent.data(), coarse.child.data(),
+            coarse.cells, coarse.neighbour.data(), coarse.link.data(), coarse.diagonal.data()};
   }
 
   void smooth_from_zero(Backend& backend, int k) {

@@ -47,6 +47,12 @@ struct Octet {
   friend RINGLET_KERNEL Octet operator*(const Octet& a, const Octet& b) {
     return each(a, b, [](auto x, auto y) { return x * y; });
   }
+  friend RINGLET_KERNEL Octet operator&(const Octet& a, const Octet& b) {
+    return each(a, b, [](auto x, auto y) { return x & y; });
+  }
+  friend RINGLET_KERNEL Octet operator>>(const Octet& a, int bits) {
+    return each(a, a, [bits](auto x, auto) { return x >> bits; });
+  }
 
  private:
   template <class F>

@@ -14,10 +14,10 @@ inline namespace RINGLET_ISA {
 // The node next to a node along an axis, in the direction of `step` (1 or -1); -1 where there is no tile.
 template <class T>
 RINGLET_FUNCTION std::int64_t next_node(const GridData<T>& g, std::int64_t node, int axis, int step) {
-  const int cell = static_cast<int>(node % kTileCells), at = coordinate_in_tile(cell, axis) + step;
+  const int cell = static_cast<int>(node & (kTileCells - 1)), at = coordinate_in_tile(cell, axis) + step;
   const int rest = cell & ~(9 << axis), within = at & 3;
   const int next = rest | ((within & 1) | (within & 2) << 2) << axis;
-  std::int64_t tile = node / kTileCells;
+  std::int64_t tile = node >> kTileBits;
   if (at < 0 || at >= kTileEdge) {
     constexpr int kStride[3] = {1, 3, 9};
     tile = g.near[tile * kAround + kAround / 2 + step * kStride[axis]];
@@ -30,8 +30,8 @@ RINGLET_FUNCTION std::int64_t next_node(const GridData<T>& g, std::int64_t node,
 template <class T>
 RINGLET_FUNCTION std::int32_t fluid_cell(const GridData<T>& g, std::int64_t node) {
   if (node < 0) return -1;
-  const std::int64_t tile = node / kTileCells;
-  const std::uint64_t bit = std::uint64_t{1} << (node % kTileCells), mask = g.fluid[tile];
+  const std::int64_t tile = node >> kTileBits;
+  const std::uint64_t bit = std::uint64_t{1} << (node & (kTileCells - 1)), mask = g.fluid[tile];
   return mask & bit ? g.first_cell[tile] + ones(mask & (bit - 1)) : -1;
 }
 

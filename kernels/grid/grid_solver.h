@@ -207,31 +207,29 @@ class GridSolver final : public HairGrid<T> {
     std::int32_t* count = first_piece_.data();
     backend_.parallel_for("grid: count pieces", data_.particles, [g = data_, count] RINGLET_LAMBDA(int i) {
       std::int32_t pieces = 0;
-      for_each_piece(g, i, [&](std::int32_t, TilePlace) { ++pieces; });
+      for_each_piece(g, i, 0, [&](const Piece&, std::int32_t, std::int32_t, std::int32_t) { ++pieces; });
       count[i] = pieces;
     });
     const std::int32_t particles = data_.particles;
     backend_.parallel_for("grid: count pieces", 1, [=] RINGLET_LAMBDA(int) { count[particles] = 0; });
     data_.pieces = backend_.scan("grid: count pieces", first_piece_, particles + 1);
-    piece_.resize(data_.pieces + 1), piece_key_.resize(data_.pieces), piece_of_.resize(data_.pieces);
+    piece_.resize(data_.pieces), piece_key_.resize(data_.pieces), piece_of_.resize(data_.pieces);
     given_back_.resize(std::size_t{2 * kNodeValues} * data_.pieces);
     data_.piece = piece_.data(), data_.given_back = given_back_.data();
     data_.piece_key = piece_key_.data(), data_.piece_of = piece_of_.data();
     backend_.parallel_for("grid: cut pieces", data_.particles, [g = data_] RINGLET_LAMBDA(int i) {
-      std::int32_t piece = g.first_piece[i];
-      for_each_piece(g, i, [&](std::int32_t sample, TilePlace tile) {
-        g.piece[piece] = {i, sample}, g.piece_key[piece] = key_of(tile.x, tile.y, tile.z);
-        g.piece_of[piece] = static_cast<std::uint32_t>(piece), ++piece;
-      });
-      if (i + 1 == g.particles) g.piece[g.pieces] = {-1, 0};
+      for_each_piece(g, i, g.first_piece[i],
+                     [&](const Piece& piece, std::int32_t x, std::int32_t y, std::int32_t z) {
+                       g.piece[piece.number] = piece, g.piece_key[piece.number] = key_of(x, y, z);
+                       g.piece_of[piece.number] = static_cast<std::uint32_t>(piece.number);
+                     });
     });
     backend_.sort("grid: sort pieces", piece_key_, piece_of_, data_.pieces, bits);
     data_.piece_key = piece_key_.data(), data_.piece_of = piece_of_.data();
     tile_pieces_.resize(data_.pieces);
     data_.tile_pieces = tile_pieces_.data();
-    backend_.parallel_for("grid: sort pieces", data_.pieces, [g = data_] RINGLET_LAMBDA(int q) {
-      g.tile_pieces[q] = tile_piece(g, static_cast<std::int32_t>(g.piece_of[q]));
-    });
+    backend_.parallel_for("grid: sort pieces", data_.pieces,
+                          [g = data_] RINGLET_LAMBDA(int q) { g.tile_pieces[q] = g.piece[g.piece_of[q]]; });
   }
 
   // The tiles that pieces lie in, those about them, and where each tile's neighbours are.
@@ -513,8 +511,7 @@ class GridSolver final : public HairGrid<T> {
   Buffer<unsigned char> ends_;
   Buffer<T> tile_density_, tile_depth_;
   Buffer<T> rest_density_, particle_, given_back_, node_, lightness_, opening_;
-  Buffer<Piece> piece_;
-  Buffer<TilePiece> tile_pieces_;
+  Buffer<Piece> piece_, tile_pieces_;
   Buffer<std::uint64_t> piece_key_, tile_key_, occupied_key_, around_key_, fluid_;
   Buffer<std::uint32_t> piece_of_, around_;
   Buffer<Fixed<T>> sums_;

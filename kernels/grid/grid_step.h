@@ -103,17 +103,12 @@ using Fixed = typename FixedPoint<T>::Integer;
 
 // A segment's way through one tile.
 struct Piece {
-  std::int32_t segment;  // its first particle
-  std::int32_t first;    // sample of the segment
-};
-
-// The same as a tile takes it, in the order of tiles: what is read one after the other lies so.
-struct TilePiece {
-  std::int32_t segment, number;  // its first particle; of the piece
+  std::int32_t segment, number;  // its first particle; of the piece, in the order of segments
   std::int32_t first, end;       // samples
   std::int32_t samples;          // of the whole segment
-  std::int32_t ends;             // kFirstOfStrand of its first particle, kLastOfStrand of its second
   std::int32_t rest;             // its first sample among all
+  std::int32_t ends;             // kFirstOfStrand of its first particle, kLastOfStrand of its second
+  std::uint32_t reached;  // which of the tiles about the tile its samples lie nearest to, a bit for each
 };
 
 inline constexpr unsigned char kFirstOfStrand = 1, kLastOfStrand = 2;
@@ -132,10 +127,10 @@ struct GridData {
   T* particle;  // [particles][8] place [cells], then velocity relative to the axes [m/s] in 3, 5 and 7
   // Pieces, in the order of segments, and by tile
   const std::int32_t* first_piece;  // [particles + 1]
-  Piece* piece;                     // [pieces + 1]
+  Piece* piece;                     // [pieces]
   std::int32_t pieces;
   std::uint64_t* piece_key;  // [pieces] its tile's; sorted once there are tiles
-  TilePiece* tile_pieces;    // [pieces] sorted by tile
+  Piece* tile_pieces;        // [pieces] sorted by tile: what is read one after the other lies so
   std::uint32_t* piece_of;   // [pieces] sorted by tile
   T* given_back;             // [pieces][6] to the segment's first and second particle
   // Tiles, sorted by key

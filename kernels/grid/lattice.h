@@ -12,9 +12,10 @@ namespace ringlet::kernels {
 
 enum Direction { kLowX, kHighX, kLowY, kHighY, kLowZ, kHighZ, kDirections };
 
-inline constexpr int kTileEdge = 4, kTileCells = 64, kAround = 27;  // tiles round a tile, itself among them
-inline constexpr int kTileAxisBits = 18;                            // of a tile's coordinate
-inline constexpr std::uint64_t kAxisBits = 0x1249249249249249ull;   // a key's bits that are x's
+inline constexpr int kTileEdge = 4, kTileBits = 6, kTileCells = 1 << kTileBits;
+inline constexpr int kAround = 27;                                 // tiles round a tile, itself among them
+inline constexpr int kTileAxisBits = 18;                           // of a tile's coordinate
+inline constexpr std::uint64_t kAxisBits = 0x1249249249249249ull;  // a key's bits that are x's
 
 inline namespace RINGLET_ISA {
 

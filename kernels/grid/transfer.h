@@ -91,26 +91,53 @@ struct Segment {
   RINGLET_FUNCTION Octet<T> place(T t) const { return a + Octet<T>(t) * (b - a); }
 };
 
-struct TilePlace {
-  std::uint32_t x, y, z;
-};
+// Where eight samples of a segment lie, from the one numbered `first` on.
 template <class T>
-RINGLET_KERNEL TilePlace tile_at_place(const Octet<T>& p) {
-  const auto along = [](T a) { return static_cast<std::uint32_t>(static_cast<std::int32_t>(a)) >> 2; };
-  return {along(p.v[0]), along(p.v[1]), along(p.v[2])};
-}
+struct SampleTiles {
+  alignas(32) std::int32_t x[8], y[8], z[8];  // of their tiles
+  alignas(32) std::int32_t nearest[8];        // tile about it, itself included, that the sample is nearest to
 
-// Calls visit(sample, tile) for the first sample in each tile on the segment's way.
-template <class T, class Visit>
-RINGLET_FUNCTION void for_each_piece(const GridData<T>& g, std::int32_t i, const Visit& visit) {
-  if (g.ends[i] & kLastOfStrand) return;
-  const Segment<T> segment(g, i, g.first_sample[i + 1] - g.first_sample[i], 0);
-  TilePlace before{};
-  for (std::int32_t s = 0; s < segment.samples; ++s) {
-    const TilePlace tile = tile_at_place(segment.place(segment.parameter(s)));
-    if (s == 0 || tile.x != before.x || tile.y != before.y || tile.z != before.z) visit(s, tile);
-    before = tile;
+  RINGLET_KERNEL SampleTiles(const Segment<T>& segment, std::int32_t first) {
+    Octet<T> t;
+    RINGLET_UNROLL
+    for (int k = 0; k < 8; ++k) t.v[k] = segment.parameter(first + k);
+    const auto along = [&](const Octet<T>& a, const Octet<T>& way, std::int32_t* tile) {
+      const Octet<std::int32_t> at = truncated(a + t * way), within = at & Octet<std::int32_t>(kTileEdge - 1);
+      (at >> 2).store(tile);
+      return (within + Octet<std::int32_t>(1)) >> 1;  // 0, 1 or 2: before the tile, in it, after it
+    };
+    const Octet<T>&a = segment.a, way = segment.b - segment.a;
+    const Octet<std::int32_t> near_x = along(spread<0>(a), spread<0>(way), x);
+    const Octet<std::int32_t> near_y = along(spread<1>(a), spread<1>(way), y);
+    const Octet<std::int32_t> near_z = along(spread<2>(a), spread<2>(way), z);
+    const Octet<std::int32_t> three(3);
+    (near_x + three * (near_y + three * near_z)).store(nearest);
   }
+};
+
+// Calls visit(piece, tile's x, y, z) for each piece of a segment; `number`: of the first of them.
+template <class T, class Visit>
+RINGLET_FUNCTION void for_each_piece(const GridData<T>& g, std::int32_t i, std::int32_t number,
+                                     const Visit& visit) {
+  if (g.ends[i] & kLastOfStrand) return;
+  const std::int32_t rest = g.first_sample[i], samples = g.first_sample[i + 1] - rest;
+  const Segment<T> segment(g, i, samples, 0);
+  Piece piece{i, number, 0, 0, samples, rest, (g.ends[i] & kFirstOfStrand) | (g.ends[i + 1] & kLastOfStrand),
+              0};
+  std::int32_t x = 0, y = 0, z = 0;
+  for (std::int32_t first = 0; first < samples; first += 8) {
+    const SampleTiles<T> tiles(segment, first);
+    for (int k = 0; k < 8 && first + k < samples; ++k) {
+      const bool other = tiles.x[k] != x || tiles.y[k] != y || tiles.z[k] != z;
+      if (other && piece.end > 0) {
+        visit(piece, x, y, z);
+        ++piece.number, piece.first = piece.end, piece.rest = rest + piece.end, piece.reached = 0;
+      }
+      x = tiles.x[k], y = tiles.y[k], z = tiles.z[k];
+      piece.reached |= 1u << tiles.nearest[k], ++piece.end;
+    }
+  }
+  visit(piece, x, y, z);
 }
 
 // ---- Weights: of the three cells about a place along each axis (the one it lies in is the middle one), for
@@ -170,20 +197,6 @@ RINGLET_FUNCTION void for_each_halo_node(const GridData<T>& g, std::int32_t tile
     }
 }
 
-// A piece as a tile takes it.
-template <class T>
-RINGLET_FUNCTION TilePiece tile_piece(const GridData<T>& g, std::int32_t number) {
-  const Piece piece = g.piece[number], next = g.piece[number + 1];
-  const std::int32_t rest = g.first_sample[piece.segment], samples = g.first_sample[piece.segment + 1] - rest;
-  return {piece.segment,
-          number,
-          piece.first,
-          next.segment == piece.segment ? next.first : samples,
-          samples,
-          (g.ends[piece.segment] & kFirstOfStrand) | (g.ends[piece.segment + 1] & kLastOfStrand),
-          rest + piece.first};
-}
-
 // Calls visit(piece, segment) for the pieces of an occupied tile.
 template <class T, class Visit>
 RINGLET_FUNCTION void for_each_piece_of_tile(const GridData<T>& g, std::int32_t occupied,
@@ -191,12 +204,12 @@ RINGLET_FUNCTION void for_each_piece_of_tile(const GridData<T>& g, std::int32_t 
   for (std::int32_t q = g.tile_piece[occupied]; q < g.tile_piece[occupied + 1]; ++q) {
     constexpr int kAhead = 8;  // particles lie anywhere: they are on their way when their turn comes
     if (q + kAhead < g.pieces) {
-      const TilePiece& later = g.tile_pieces[q + kAhead];
+      const Piece& later = g.tile_pieces[q + kAhead];
       prefetch(g.particle + static_cast<std::int64_t>(later.segment) * 8);
       prefetch(g.particle + static_cast<std::int64_t>(later.segment) * 8 + 15);
       prefetch(g.rest_density + later.rest);
     }
-    const TilePiece piece = g.tile_pieces[q];
+    const Piece piece = g.tile_pieces[q];
     visit(piece, Segment<T>(g, piece.segment, piece.samples, piece.ends));
   }
 }
@@ -215,17 +228,8 @@ RINGLET_FUNCTION std::uint64_t key_around(std::uint64_t key, int n) {
 template <class T>
 RINGLET_FUNCTION std::uint32_t tiles_reached(const GridData<T>& g, std::int32_t occupied) {
   std::uint32_t reached = 0;
-  for_each_piece_of_tile(g, occupied, [&](const TilePiece& piece, const Segment<T>& segment) {
-    for (std::int32_t s = piece.first; s < piece.end; ++s) {
-      const Octet<T> place = segment.place(segment.parameter(s));
-      int corner = 0;  // the tile that the sample is nearest to along each axis, as a number about the tile
-      for (int c = 2; c >= 0; --c) {
-        const int within = static_cast<std::int32_t>(place.v[c]) & (kTileEdge - 1);
-        corner = 3 * corner + (within == 0 ? 0 : within == kTileEdge - 1 ? 2 : 1);
-      }
-      reached |= 1u << corner;
-    }
-  });
+  for (std::int32_t q = g.tile_piece[occupied]; q < g.tile_piece[occupied + 1]; ++q)
+    reached |= g.tile_pieces[q].reached;
   // What reaches a corner reaches its edges and faces.
   for (int axis = 0, stride = 1; axis < 3; ++axis, stride *= 3)
     for (int n = 0; n < kAround; ++n)
@@ -289,7 +293,7 @@ RINGLET_FUNCTION void scatter_tile(const GridData<T>& g, std::int32_t occupied) 
   const Octet<T> scale = Octet<T>::load(g.scale);
   alignas(64) Fixed<T> sums[kHaloNodes * kNodeValues];
   for (int n = 0; n < kHaloNodes * kNodeValues; ++n) sums[n] = 0;
-  for_each_piece_of_tile(g, occupied, [&](const TilePiece& piece, const Segment<T>& segment) {
+  for_each_piece_of_tile(g, occupied, [&](const Piece& piece, const Segment<T>& segment) {
     const T* rest = g.rest_density + (piece.rest - piece.first);
     constexpr int kMomenta = 1 << 3 | 1 << 5 | 1 << 7;  // where a particle has its velocity
     const Octet<T> one(T(1)), length(segment.sample_length());
@@ -363,7 +367,7 @@ RINGLET_FUNCTION void gather_tile(const GridData<T>& g, std::int32_t occupied) {
   for_each_halo_node(g, tile, [&](int halo, std::int64_t node) {
     Octet<T>::load(g.node + node * kNodeValues).store(values + halo * kNodeValues);
   });
-  for_each_piece_of_tile(g, occupied, [&](const TilePiece& piece, const Segment<T>& segment) {
+  for_each_piece_of_tile(g, occupied, [&](const Piece& piece, const Segment<T>& segment) {
     // Of the first particle, then of the second; lanes as the nodes'.
     Octet<T> given[2] = {Octet<T>(T(0)), Octet<T>(T(0))};
     Octet<T> speed[2] = {Octet<T>(T(0)), Octet<T>(T(0))};
@@ -421,7 +425,7 @@ RINGLET_FUNCTION void rest_densities(const GridData<T>& g, std::int32_t occupied
   for (int n = 0; n < kHaloNodes; ++n) density[n] = T(0);
   for_each_halo_node(
       g, tile, [&](int halo, std::int64_t node) { density[halo] = g.node[node * kNodeValues + kDensity]; });
-  for_each_piece_of_tile(g, occupied, [&](const TilePiece& piece, const Segment<T>& segment) {
+  for_each_piece_of_tile(g, occupied, [&](const Piece& piece, const Segment<T>& segment) {
     for (std::int32_t s = piece.first; s < piece.end; ++s) {
       const SampleWeights<T> w(corner, segment.place(segment.parameter(s)));
       T& greatest = g.rest_density[piece.rest - piece.first + s];

@@ -83,9 +83,10 @@ struct Opening {
 };
 template <class T>
 RINGLET_FUNCTION Opening<T> opening_of(const GridData<T>& g, std::int64_t node, int axis) {
-  const std::int32_t wall = g.wall[node / kTileCells];
+  const std::int32_t wall = g.wall[node >> kTileBits];
   if (wall < 0) return {T(1), T(0)};
-  const T* at = g.opening + (static_cast<std::int64_t>(wall) * kTileCells + node % kTileCells) * kWallValues;
+  const T* at =
+      g.opening + (static_cast<std::int64_t>(wall) * kTileCells + (node & (kTileCells - 1))) * kWallValues;
   return {at[axis], at[3 + axis]};
 }
 

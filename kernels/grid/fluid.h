@@ -101,23 +101,50 @@ RINGLET_FUNCTION bool has_fluid_faces(const GridData<T>& g, std::int32_t tile) {
   return fluid(tile) || fluid(near[-1]) || fluid(near[-3]) || fluid(near[-9]);
 }
 
-// 1 / mass of a node's faces, 0 where neither cell beside it is fluid.
+// The cells of a tile whose lower face along an axis has a fluid cell below it, a bit for each.
 template <class T>
-RINGLET_FUNCTION void find_lightness(const GridData<T>& g, std::int64_t node) {
-  const bool above = fluid_cell(g, node) >= 0;
+RINGLET_FUNCTION std::uint64_t fluid_below(const GridData<T>& g, std::int32_t tile, int axis) {
+  constexpr int kStride[3] = {1, 3, 9};
+  // Cells whose coordinate along the axis has no lower bit, no upper one.
+  constexpr std::uint64_t kEven[3] = {0x5555555555555555ull, 0x3333333333333333ull, 0x0f0f0f0f0f0f0f0full};
+  constexpr std::uint64_t kFirst[3] = {0x00ff00ff00ff00ffull, 0x0000ffff0000ffffull, 0x00000000ffffffffull};
+  const std::uint64_t even = kEven[axis], first = kFirst[axis], fluid = g.fluid[tile];
+  const std::int32_t other = g.near[static_cast<std::int64_t>(tile) * kAround + kAround / 2 - kStride[axis]];
+  const std::uint64_t beyond = other < 0 ? 0 : g.fluid[other];
+  return (fluid & even) << (1 << axis) | (fluid & ~even & first) << (7 << axis) |
+         (beyond & ~even & ~first) >> (9 << axis);
+}
+// Those that have a fluid cell on either side of it.
+template <class T>
+RINGLET_FUNCTION std::uint64_t fluid_faces(const GridData<T>& g, std::int32_t tile, int axis) {
+  return g.fluid[tile] | fluid_below(g, tile, axis);
+}
+
+// Calls f(bit) for the bits that are set, from the lowest on.
+template <class F>
+RINGLET_FUNCTION void for_each_bit(std::uint64_t bits, const F& f) {
+  for (; bits != 0; bits &= bits - 1) f(ones(~bits & (bits - 1)));
+}
+
+// 1 / mass of a tile's faces, 0 where neither cell beside one is fluid.
+template <class T>
+RINGLET_FUNCTION void find_lightness(const GridData<T>& g, std::int32_t tile) {
+  const std::int64_t first = static_cast<std::int64_t>(tile) * kTileCells;
+  for (int face = 0; face < kTileCells * 3; ++face) g.lightness[first * 3 + face] = T(0);
   for (int axis = 0; axis < 3; ++axis) {
     const int value = kFaceMass + 2 * axis;
-    const std::int64_t below = next_node(g, node, axis, -1);
-    T mass = T(0);
-    const auto at_least = [&](std::int64_t opposite) {
-      if (opposite >= 0)
-        mass = max(mass, static_cast<T>(kLeastFaceShare) * g.node[opposite * kNodeValues + value]);
-    };
-    const bool beside = fluid_cell(g, below) >= 0;
-    if (above) at_least(next_node(g, node, axis, 1));
-    if (beside) at_least(below);
-    if (above || beside) mass = max(mass, g.node[node * kNodeValues + value]);
-    g.lightness[node * 3 + axis] = mass > T(0) ? T(1) / mass : T(0);
+    const std::uint64_t below = fluid_below(g, tile, axis);
+    for_each_bit(g.fluid[tile] | below, [&](int cell) {
+      const std::int64_t node = first + cell;
+      T mass = g.node[node * kNodeValues + value];
+      const auto at_least = [&](std::int64_t opposite) {
+        if (opposite >= 0)
+          mass = max(mass, static_cast<T>(kLeastFaceShare) * g.node[opposite * kNodeValues + value]);
+      };
+      if (g.fluid[tile] >> cell & 1) at_least(next_node(g, node, axis, 1));
+      if (below >> cell & 1) at_least(next_node(g, node, axis, -1));
+      if (mass > T(0)) g.lightness[node * 3 + axis] = T(1) / mass;
+    });
   }
 }
 
@@ -201,31 +228,32 @@ RINGLET_FUNCTION T pressed_velocity(const GridData<T>& g, const double* pressure
 }
 
 // Readies a tile's nodes for the way back (`pressure` null: of places alone): the change of velocity and the
-// share `pic` of the velocity itself take the place of masses, no displacement that of velocities.
+// share `pic` of the velocity itself take the place of velocities, no displacement that of masses.
 template <class T>
 RINGLET_FUNCTION void press_velocities(const GridData<T>& g, const double* pressure, std::int32_t tile) {
-  const bool fluid = pressure && has_fluid_faces(g, tile);
+  std::uint64_t faces[3] = {};
+  for (int axis = 0; pressure && axis < 3; ++axis) faces[axis] = fluid_faces(g, tile, axis);
   for (int cell = 0; cell < kTileCells; ++cell) {
     const std::int64_t node = static_cast<std::int64_t>(tile) * kTileCells + cell;
     T* values = g.node + node * kNodeValues + kFaceMass;
     if (!(values[0] > T(0) || values[2] > T(0) || values[4] > T(0))) continue;  // no hair, nothing to read
     for (int axis = 0; axis < 3; ++axis) {
-      const T change = fluid ? pressed_velocity(g, pressure, node, axis, values[2 * axis + 1]) : T(0);
-      values[2 * axis] = fma(g.step.pic, values[2 * axis + 1], change), values[2 * axis + 1] = T(0);
+      T &displacement = values[2 * axis], &velocity = values[2 * axis + 1];
+      const T change = faces[axis] >> cell & 1 ? pressed_velocity(g, pressure, node, axis, velocity) : T(0);
+      displacement = T(0), velocity = fma(g.step.pic, velocity, change);
     }
   }
 }
 // The displacement of each face [cells].
 template <class T>
 RINGLET_FUNCTION void press_places(const GridData<T>& g, const double* pressure, std::int32_t tile) {
-  if (!has_fluid_faces(g, tile)) return;
-  for (int cell = 0; cell < kTileCells; ++cell) {
-    const std::int64_t node = static_cast<std::int64_t>(tile) * kTileCells + cell;
-    for (int axis = 0; axis < 3; ++axis)
+  for (int axis = 0; axis < 3; ++axis)
+    for_each_bit(fluid_faces(g, tile, axis), [&](int cell) {
+      const std::int64_t node = static_cast<std::int64_t>(tile) * kTileCells + cell;
       if (opening_of(g, node, axis).share > T(0))
-        g.node[node * kNodeValues + kFaceMass + 2 * axis + 1] =
+        g.node[node * kNodeValues + kFaceMass + 2 * axis] =
             min(max(pressed(g, pressure, node, axis), T(-1)), T(1));
-  }
+    });
 }
 
 }  // namespace RINGLET_ISA

@@ -406,9 +406,7 @@ class GridSolver final : public HairGrid<T> {
     backend_.parallel_for(
         "grid: lightness", data_.tiles,
         [g = data_] RINGLET_LAMBDA(int tile) {
-          const bool fluid = has_fluid_faces(g, tile);
-          for (int cell = 0; fluid && cell < kTileCells; ++cell)
-            find_lightness(g, static_cast<std::int64_t>(tile) * kTileCells + cell);
+          if (has_fluid_faces(g, tile)) find_lightness(g, tile);
         },
         kTileChunk);
     auto& fine = pressure_.multigrid.level[0];
@@ -442,8 +440,8 @@ class GridSolver final : public HairGrid<T> {
   template <class F>
   RINGLET_FUNCTION static void for_each_cell(const GridData<T>& g, std::int32_t tile, const F& f) {
     std::int32_t number = g.first_cell[tile];
-    for (int cell = 0; cell < kTileCells; ++cell)
-      if (g.fluid[tile] >> cell & 1) f(static_cast<std::int64_t>(tile) * kTileCells + cell, number++);
+    for_each_bit(g.fluid[tile],
+                 [&](int cell) { f(static_cast<std::int64_t>(tile) * kTileCells + cell, number++); });
   }
 
   // ---- From nodes to strands

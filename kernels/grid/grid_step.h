@@ -132,7 +132,7 @@ struct GridData {
   std::uint64_t* piece_key;  // [pieces] its tile's; sorted once there are tiles
   Piece* tile_pieces;        // [pieces] sorted by tile: what is read one after the other lies so
   std::uint32_t* piece_of;   // [pieces] sorted by tile
-  T* given_back;             // [pieces][6] to the segment's first and second particle
+  T* given_back;             // [pieces][2][kNodeValues] to the segment's first and second particle
   // Tiles, sorted by key
   std::int32_t low[3];     // tile coordinates of key 0
   std::int32_t extent[3];  // tiles along each axis

@@ -65,6 +65,9 @@ RINGLET_FUNCTION void shift_particle(const GridData<T>& g, int i) {
 // A sample's hair, however far a strand is torn [cells]; sums are scaled to hold it.
 inline constexpr int kMostSampleLength = 2, kMostSampleMass = 2;
 
+// Where a particle has its velocity, and a node its momentum.
+inline constexpr int kMomenta = 1 << 3 | 1 << 5 | 1 << 7;
+
 template <class T>
 struct Segment {
   Octet<T> a, b;  // its particles in the grid's axes
@@ -106,7 +109,7 @@ struct SampleTiles {
       (at >> 2).store(tile);
       return (within + Octet<std::int32_t>(1)) >> 1;  // 0, 1 or 2: before the tile, in it, after it
     };
-    const Octet<T>&a = segment.a, way = segment.b - segment.a;
+    const Octet<T> a = segment.a, way = segment.b - a;
     const Octet<std::int32_t> near_x = along(spread<0>(a), spread<0>(way), x);
     const Octet<std::int32_t> near_y = along(spread<1>(a), spread<1>(way), y);
     const Octet<std::int32_t> near_z = along(spread<2>(a), spread<2>(way), z);
@@ -293,9 +296,9 @@ RINGLET_FUNCTION void scatter_tile(const GridData<T>& g, std::int32_t occupied) 
   const Octet<T> scale = Octet<T>::load(g.scale);
   alignas(64) Fixed<T> sums[kHaloNodes * kNodeValues];
   for (int n = 0; n < kHaloNodes * kNodeValues; ++n) sums[n] = 0;
+  for_each_halo_node(g, tile, [&](int, std::int64_t node) { prefetch(g.sums + node * kNodeValues); });
   for_each_piece_of_tile(g, occupied, [&](const Piece& piece, const Segment<T>& segment) {
     const T* rest = g.rest_density + (piece.rest - piece.first);
-    constexpr int kMomenta = 1 << 3 | 1 << 5 | 1 << 7;  // where a particle has its velocity
     const Octet<T> one(T(1)), length(segment.sample_length());
     const Octet<T> first = choose<kMomenta>(segment.a, one), second = choose<kMomenta>(segment.b, one);
     for (std::int32_t s = piece.first; s < piece.end; ++s) {
@@ -354,6 +357,12 @@ RINGLET_KERNEL Octet<T> read_sample(const SampleWeights<T>& w, const T* values) 
   return read;
 }
 
+// What a piece gives back to its segment's first particle, then to its second.
+template <class T>
+RINGLET_KERNEL T* given_back_to(const GridData<T>& g, std::int32_t piece) {
+  return g.given_back + static_cast<std::int64_t>(piece) * 2 * kNodeValues;
+}
+
 // What a tile's samples read off the nodes, gathered to the ends of their segments: of velocities change +
 // pic (velocity - own), own the sample's, and of places the displacement. Each end takes it by the share of
 // its mass that the sample has, so that what nodes give away is what particles get.
@@ -364,17 +373,17 @@ RINGLET_FUNCTION void gather_tile(const GridData<T>& g, std::int32_t occupied) {
   tile_corner(g, tile, corner);
   alignas(64) T values[kHaloNodes * kNodeValues];
   for (int n = 0; n < kHaloNodes * kNodeValues; ++n) values[n] = T(0);
+  for (std::int32_t q = g.tile_piece[occupied]; q < g.tile_piece[occupied + 1]; ++q)
+    prefetch(given_back_to(g, g.tile_pieces[q].number));
   for_each_halo_node(g, tile, [&](int halo, std::int64_t node) {
     Octet<T>::load(g.node + node * kNodeValues).store(values + halo * kNodeValues);
   });
   for_each_piece_of_tile(g, occupied, [&](const Piece& piece, const Segment<T>& segment) {
     // Of the first particle, then of the second; lanes as the nodes'.
-    Octet<T> given[2] = {Octet<T>(T(0)), Octet<T>(T(0))};
-    Octet<T> speed[2] = {Octet<T>(T(0)), Octet<T>(T(0))};
-    for (int v = kFaceMass; v < kNodeValues; v += 2) {
-      speed[0].v[v] = g.step.pic * segment.a.v[v + 1];
-      speed[1].v[v] = g.step.pic * segment.b.v[v + 1];
-    }
+    const Octet<T> zero(T(0)), pic(g.step.pic);
+    const Octet<T> speed[2] = {pic * choose<kMomenta>(segment.a, zero),
+                               pic * choose<kMomenta>(segment.b, zero)};
+    Octet<T> given[2] = {zero, zero};
     for (std::int32_t s = piece.first; s < piece.end; ++s) {
       const T t = segment.parameter(s), a = (T(1) - t) * segment.share_a, b = t * segment.share_b;
       const T own = T(1) / (a + b);
@@ -382,7 +391,7 @@ RINGLET_FUNCTION void gather_tile(const GridData<T>& g, std::int32_t occupied) {
                             (Octet<T>(a * own) * speed[0] + Octet<T>(b * own) * speed[1]);
       given[0] = given[0] + Octet<T>(a) * read, given[1] = given[1] + Octet<T>(b) * read;
     }
-    T* to = g.given_back + static_cast<std::int64_t>(piece.number) * 2 * kNodeValues;
+    T* to = given_back_to(g, piece.number);
     given[0].store(to), given[1].store(to + kNodeValues);
   });
 }
@@ -396,7 +405,7 @@ RINGLET_FUNCTION void give_back(const GridData<T>& g, T cell, int strand) {
     Octet<T> given(T(0));
     const auto add = [&](std::int32_t segment, int end) {
       for (std::int32_t q = g.first_piece[segment]; q < g.first_piece[segment + 1]; ++q)
-        given = given + Octet<T>::load(g.given_back + (static_cast<std::int64_t>(q) * 2 + end) * kNodeValues);
+        given = given + Octet<T>::load(given_back_to(g, q) + end * kNodeValues);
     };
     if (i > 0) add(first + i - 1, 1);
     if (i + 1 < count) add(first + i, 0);
@@ -408,8 +417,8 @@ RINGLET_FUNCTION void give_back(const GridData<T>& g, T cell, int strand) {
              static_cast<T>(r[2]) * given.v[kFaceMass + 4 + value];
     };
     for (int c = 0; c < 3; ++c) {
-      g.step.state.velocity[base + c * kLanes] += turned(c, 0);
-      if (cell > T(0)) g.step.state.position[base + c * kLanes] += cell * turned(c, 1);
+      g.step.state.velocity[base + c * kLanes] += turned(c, 1);
+      if (cell > T(0)) g.step.state.position[base + c * kLanes] += cell * turned(c, 0);
     }
   }
 }

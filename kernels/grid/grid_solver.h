@@ -96,9 +96,9 @@ class GridSolver final : public HairGrid<T> {
            tile_pieces_.bytes() + piece_.bytes() + piece_key_.bytes() + piece_of_.bytes() +
            given_back_.bytes() + tile_key_.bytes() + near_.bytes() + occupied_key_.bytes() +
            occupied_tile_.bytes() + tile_piece_.bytes() + flag_.bytes() + around_key_.bytes() +
-           around_.bytes() + sums_.bytes() + node_.bytes() + lightness_.bytes() + wall_.bytes() +
-           opening_.bytes() + wall_tile_.bytes() + fluid_.bytes() + first_cell_.bytes() +
-           tile_density_.bytes() + tile_depth_.bytes();
+           around_.bytes() + node_.bytes() + lightness_.bytes() + wall_.bytes() + opening_.bytes() +
+           wall_tile_.bytes() + fluid_.bytes() + first_cell_.bytes() + tile_density_.bytes() +
+           tile_depth_.bytes();
   }
 
   // Without wind there is no upwind: no tile is before another.
@@ -300,13 +300,13 @@ class GridSolver final : public HairGrid<T> {
 
   void scatter() {
     const std::size_t nodes = static_cast<std::size_t>(data_.tiles) * kTileCells;
-    sums_.resize(nodes * kNodeValues), node_.resize(nodes * kNodeValues), lightness_.resize(nodes * 3);
-    data_.sums = sums_.data(), data_.node = node_.data(), data_.lightness = lightness_.data();
+    node_.resize(nodes * kNodeValues), lightness_.resize(nodes * 3);
+    data_.node = node_.data(), data_.lightness = lightness_.data();
     choose_scale();
     backend_.parallel_for(
         "grid: clear", data_.tiles,
         [g = data_] RINGLET_LAMBDA(int tile) {
-          Fixed<T>* sums = g.sums + static_cast<std::int64_t>(tile) * kTileCells * kNodeValues;
+          Fixed<T>* sums = sums_of(g, static_cast<std::int64_t>(tile) * kTileCells);
           for (int v = 0; v < kTileCells * kNodeValues; ++v) sums[v] = 0;
         },
         kTileChunk);
@@ -512,7 +512,6 @@ class GridSolver final : public HairGrid<T> {
   Buffer<Piece> piece_, tile_pieces_;
   Buffer<std::uint64_t> piece_key_, tile_key_, occupied_key_, around_key_, fluid_;
   Buffer<std::uint32_t> piece_of_, around_;
-  Buffer<Fixed<T>> sums_;
 };
 
 }  // namespace RINGLET_ISA

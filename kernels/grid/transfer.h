@@ -270,6 +270,13 @@ RINGLET_FUNCTION void find_around(const GridData<T>& g, std::int32_t occupied) {
 
 // ---- Onto the nodes
 
+// Where a node's values are, while they are sums.
+template <class T>
+RINGLET_KERNEL Fixed<T>* sums_of(const GridData<T>& g, std::int64_t node) {
+  static_assert(sizeof(Fixed<T>) == sizeof(T));
+  return reinterpret_cast<Fixed<T>*>(g.node + node * kNodeValues);
+}
+
 template <class T>
 RINGLET_KERNEL void add_sample(const SampleWeights<T>& w, const Octet<T>& value, Fixed<T>* sums) {
   RINGLET_UNROLL
@@ -296,7 +303,7 @@ RINGLET_FUNCTION void scatter_tile(const GridData<T>& g, std::int32_t occupied) 
   const Octet<T> scale = Octet<T>::load(g.scale);
   alignas(64) Fixed<T> sums[kHaloNodes * kNodeValues];
   for (int n = 0; n < kHaloNodes * kNodeValues; ++n) sums[n] = 0;
-  for_each_halo_node(g, tile, [&](int, std::int64_t node) { prefetch(g.sums + node * kNodeValues); });
+  for_each_halo_node(g, tile, [&](int, std::int64_t node) { prefetch(sums_of(g, node)); });
   for_each_piece_of_tile(g, occupied, [&](const Piece& piece, const Segment<T>& segment) {
     const T* rest = g.rest_density + (piece.rest - piece.first);
     const Octet<T> one(T(1)), length(segment.sample_length());
@@ -310,29 +317,28 @@ RINGLET_FUNCTION void scatter_tile(const GridData<T>& g, std::int32_t occupied) 
     }
   });
   for_each_halo_node(g, tile, [&](int halo, std::int64_t node) {
-    Fixed<T>* to = g.sums + node * kNodeValues;
+    Fixed<T>* to = sums_of(g, node);
     (Octet<Fixed<T>>::load(to) + Octet<Fixed<T>>::load(sums + halo * kNodeValues)).store(to);
   });
 }
 
 // Density, target, masses and velocities of a tile's nodes from their sums. Most nodes of most tiles have no
-// hair.
+// hair: nothing, as a sum and as a value.
 template <class T>
 RINGLET_FUNCTION void finish_tile(const GridData<T>& g, std::int32_t tile) {
   Octet<T> unit;
   for (int v = 0; v < kNodeValues; ++v) unit.v[v] = T(1) / g.scale[v];
   const auto over = [](T a, T b) { return b > T(0) ? a / b : T(0); };
   for (int cell = 0; cell < kTileCells; ++cell) {
-    const std::int64_t at = (static_cast<std::int64_t>(tile) * kTileCells + cell) * kNodeValues;
+    const std::int64_t node = static_cast<std::int64_t>(tile) * kTileCells + cell;
+    const Fixed<T>* sums = sums_of(g, node);
     Fixed<T> hair = 0;
-    for (int v = 0; v < kNodeValues; ++v) hair |= g.sums[at + v];
-    Octet<T> value(T(0));
-    if (hair != 0) {
-      value = to_real<T>(Octet<Fixed<T>>::load(g.sums + at)) * unit;
-      value.v[kTarget] = over(value.v[kTarget], value.v[kDensity]);
-      for (int v = kFaceMass; v < kNodeValues; v += 2) value.v[v + 1] = over(value.v[v + 1], value.v[v]);
-    }
-    value.store(g.node + at);
+    for (int v = 0; v < kNodeValues; ++v) hair |= sums[v];
+    if (hair == 0) continue;
+    Octet<T> value = to_real<T>(Octet<Fixed<T>>::load(sums)) * unit;
+    value.v[kTarget] = over(value.v[kTarget], value.v[kDensity]);
+    for (int v = kFaceMass; v < kNodeValues; v += 2) value.v[v + 1] = over(value.v[v + 1], value.v[v]);
+    value.store(g.node + node * kNodeValues);
   }
 }
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "kernels/launch/contacts.h"
-#include "state/strand_model.h"
+#include "state/strand_order.h"
 
 namespace ringlet::kernels_testing {
 
@@ -32,26 +32,6 @@ inline void run_with_tbb(void*, int chunks, void (*body)(const void*, int), cons
   tbb::parallel_for(0, chunks, [=](int chunk) { body(context, chunk); });
 }
 
-// The kernels' memory.
-template <class T>
-class HairContactRun {
- public:
-  explicit HairContactRun(InstructionSet set = kernels::best_instruction_set())
-      : table_(kernels::cpu_hair_contacts<T>(set)), memory_(table_.make({run_with_tbb, nullptr})) {}
-  ~HairContactRun() { table_.destroy(memory_); }
-  HairContactRun(const HairContactRun&) = delete;
-  HairContactRun& operator=(const HairContactRun&) = delete;
-  HairContactFigures begin(const kernels::HairContactStep<T>& step) { return table_.begin(memory_, step); }
-  void pass(const kernels::HairContactStep<T>& step, HairContactFigures& figures) {
-    table_.pass(memory_, step, figures);
-  }
-  std::size_t bytes() const { return table_.bytes(memory_); }
-
- private:
-  const kernels::HairContactTable<T>& table_;
-  kernels::HairContactMemory* memory_;
-};
-
 template <class T>
 class HairRun {
  public:
@@ -60,7 +40,10 @@ class HairRun {
 
   HairRun(const std::vector<HairStrand>& strands, double radius, int clamped,
           InstructionSet set = kernels::best_instruction_set())
-      : model(input_of(strands)), state(model), contacts(set), kernels_(kernels::cpu_kernels<T>(set)) {
+      : model(input_of(strands)),
+        state(model),
+        contacts(kernels::make_hair_contacts<T>(set, {run_with_tbb, nullptr})),
+        kernels_(kernels::cpu_kernels<T>(set)) {
     step.clamped = clamped, step.friction = T(0.3);
     poses_.resize(strands.size());
     for (std::size_t s = 0; s < strands.size(); ++s) poses_[s].position = strands[s].points[0];
@@ -71,6 +54,7 @@ class HairRun {
       for (std::size_t i = 0; i < strands[s].points.size(); ++i)
         for (int c = 0; c < 3; ++c)
           state.velocity[model.layout.at(s, static_cast<int>(i), 3, c)] = T(strands[s].velocity[c]);
+    order_ = state::strands_by_root(model, state);
     radius_.assign(model.layout.rows() * kLanes, T(radius));
     const auto batches = static_cast<std::size_t>(model.layout.batches());
     figures_.assign(batches * kernels::kFigures * kLanes, T(0));
@@ -82,15 +66,19 @@ class HairRun {
     strand.consistent_angular = strand.exact_integrity = true;
     strand.clamped = clamped, strand.length_iterations = 8, strand.length_tolerance = T(1e-4);
     strand.strain_limit = strand.speed_limit = T(1e9);
-    remember();
+    start_ = state.position, start_roots_ = state.root_points;
   }
 
   // What the next application starts from.
-  void remember() { start_ = state.position, start_roots_ = state.root_points; }
+  void remember() {
+    contacts->settle(contact_step());
+    start_ = state.position, start_roots_ = state.root_points;
+  }
 
   // As the state now is.
   const kernels::HairContactStep<T>& contact_step() {
     step.batches = model.view(), step.row_count = static_cast<std::int32_t>(model.layout.rows());
+    step.order = order_.data(), step.strands = static_cast<std::int32_t>(order_.size());
     step.state = state.view(), step.radius = radius_.data();
     step.start = start_.data(), step.start_root_points = start_roots_.data();
     step.root_points = state.root_points.data();
@@ -100,13 +88,14 @@ class HairRun {
   // `seconds`: that the way since `remember` took.
   HairContactFigures collide(double seconds) {
     contact_step();
-    HairContactFigures found = contacts.begin(step);
+    HairContactFigures figures = contacts->begin(step);
     for (int pass = 0; pass < passes; ++pass) {
-      contacts.pass(step, found);
-      if (found.contacts == 0) break;
+      figures.contacts = contacts->pass(step);
+      if (figures.contacts == 0) break;
       hold_lengths(seconds);
     }
-    return found;
+    contacts->count_crossings(step, figures);
+    return figures;
   }
 
   // The strands by themselves. Free strands have a root point too, which stays.
@@ -153,6 +142,9 @@ class HairRun {
   void set_velocity(std::size_t strand, int i, const Vec3& v) {
     for (int c = 0; c < 3; ++c) state.velocity[model.layout.at(strand, i, 3, c)] = T(v[c]);
   }
+  void set_radius(std::size_t strand, double radius) {
+    for (int i = 0; i < count(strand); ++i) radius_[model.layout.at(strand, i, 1, 0)] = T(radius);
+  }
   int count(std::size_t strand) const { return model.living(strand); }
   std::size_t strands() const { return poses_.size(); }
 
@@ -160,7 +152,7 @@ class HairRun {
   state::StrandState<T> state;
   kernels::StrandParameters<T> strand{};
   kernels::HairContactStep<T> step{};
-  HairContactRun<T> contacts;
+  std::unique_ptr<kernels::HairContacts<T>> contacts;
   int passes = 4;
 
  private:
@@ -177,6 +169,7 @@ class HairRun {
   std::vector<Pose> poses_;
   state::AlignedVector<T> start_, radius_, figures_, length_figures_, scratch_;
   state::AlignedVector<double> start_roots_;
+  std::vector<std::int32_t> order_;
 };
 
 }  // namespace ringlet::kernels_testing

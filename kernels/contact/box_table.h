@@ -1,11 +1,11 @@
 // Where to look for a segment's neighbours: a uniform spatial hash of boxes, in levels by size.
 //
-// The box of a segment holds its places at the start, moved along with the mean motion, and at the end. A
+// Segments are cut into pieces, each with a box of its own, for what is long and thin fills its box badly. A
 // level takes boxes up to twice the size of the level before it, in cells half as wide along x, along which
 // cells lie one after the other in memory. Cells are numbered modulo a power of two along each axis, so that
 // a strand that was flung far away costs no memory. The table holds the boxes sorted by cell.
 #pragma once
-#include "kernels/contact/mean_motion.h"
+#include "kernels/contact/contact_data.h"
 
 namespace ringlet::kernels {
 inline namespace RINGLET_ISA {
@@ -36,17 +36,17 @@ struct BoxLevels {
   RINGLET_FUNCTION static BoxLevels make(const float* low, const float* high, float mean_half_size,
                                          std::int32_t boxes) {
     float most = 16;
-    while (most < 128 && most * most * most < 2 * static_cast<float>(boxes)) most *= 2;
+    while (most < 128 && most * most * most < 16 * static_cast<float>(boxes)) most *= 2;
     BoxLevels levels{};
     for (int k = 0; k < kLevels; ++k) {
       BoxLevel& level = levels.level[k];
-      level.half_size = k == 0 ? mean_half_size : 2 * levels.level[k - 1].half_size;
+      level.half_size = k == 0 ? 1.5f * mean_half_size : 2 * levels.level[k - 1].half_size;
       level.first_cell = levels.total_cells;
       std::int32_t cells = 1;
       for (int c = 0; c < 3; ++c) {
         levels.low[c] = low[c];
-        level.per_cell[c] = (c == 0 ? 2.0f : 1.0f) / level.half_size;
-        const float wanted = min((high[c] - low[c]) * level.per_cell[c], most);
+        level.per_cell[c] = (c == 0 ? 4.0f : 0.7f) / level.half_size;
+        const float wanted = min((high[c] - low[c]) * level.per_cell[c], c == 0 ? 4 * most : most);
         for (level.cells[c] = 1; static_cast<float>(level.cells[c]) < wanted;) level.cells[c] *= 2;
         cells *= level.cells[c];
       }
@@ -80,34 +80,34 @@ struct BoxLevels {
   }
 };
 
-// Sorted by cell, and within a cell by place: in an order that does not depend on that of the strands.
+// One of a segment's equal pieces.
+struct Piece {
+  std::int32_t segment;
+  std::int16_t number, pieces;
+
+  // Whether the place `at` in [0, 1] along the segment is on it.
+  template <class T>
+  RINGLET_KERNEL bool holds(T at) const {
+    const auto there = static_cast<std::int32_t>(at * T(pieces));
+    return (there < pieces ? there : pieces - 1) == number;
+  }
+};
+
+// Sorted by cell, and within a cell by segment.
 struct BoxTable {
   BoxLevels levels;
-  const std::int32_t* first;    // [total_cells + 1] of each cell
-  const std::int32_t* segment;  // [boxes] its number
-  const std::int32_t* strand;   // [boxes]
-  const float* components;      // see at()
+  const std::int32_t* first;  // [total_cells + 1] of each cell
+  const Piece* piece;         // [boxes]
+  const std::uint64_t* cell;  // [boxes] that each is in
+  const float* corners;       // low and high [m], see at()
   std::int32_t boxes;
 
-  // Boxes lie in blocks, in each component after component.
-  static constexpr std::int32_t kBlock = 16;
-  RINGLET_KERNEL static std::int64_t at(std::int32_t component, std::int32_t box);
+  // Boxes lie in blocks, in each corner after corner.
+  static constexpr std::int32_t kBlock = 16, kCorners = 6;
+  RINGLET_KERNEL static std::int64_t at(std::int32_t corner, std::int32_t box) {
+    return (static_cast<std::int64_t>(box / kBlock) * kCorners + corner) * kBlock + box % kBlock;
+  }
 };
-// Of the box's low and high corner, then where the segment begins and its vector, at the start and at the
-// end.
-enum BoxComponent {
-  kLow,
-  kHigh = 3,
-  kStartBegin = 6,
-  kStartAlong = 9,
-  kEndBegin = 12,
-  kEndAlong = 15,
-  kBoxComponents = 18
-};
-
-RINGLET_KERNEL std::int64_t BoxTable::at(std::int32_t component, std::int32_t box) {
-  return (static_cast<std::int64_t>(box / kBlock) * kBoxComponents + component) * kBlock + box % kBlock;
-}
 
 // Calls visit(begin, end) for the runs of the table among which all boxes of `level` are that overlap `box`.
 template <class Visit>

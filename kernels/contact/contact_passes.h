@@ -21,11 +21,19 @@ struct ContactRecord {
 template <class T>
 struct ContactPairs {
   const std::int32_t *a, *b;  // [pairs]
+  const signed char* side;    // [pairs] see find_contact
   ContactRecord<T>* record;   // [pairs]
   unsigned char* active;      // [pairs]
   std::int32_t* contacts;     // [particles] of the segment
   std::int32_t count;
 };
+
+template <class R>
+RINGLET_KERNEL R load_sides(const signed char* side) {
+  alignas(64) Scalar<R> sides[Traits<R>::kWidth];
+  for (int lane = 0; lane < Traits<R>::kWidth; ++lane) sides[lane] = static_cast<Scalar<R>>(side[lane]);
+  return load<R>(sides);
+}
 
 // Contacts as places are now. For a pack of pairs.
 template <class R>
@@ -34,21 +42,16 @@ struct FindContacts {
   static constexpr int kWidth = Traits<R>::kWidth;
   ContactPairs<T> pairs;
   HairPlaces<T> places;
-  T reach;  // largest sum of radii [m]
 
   RINGLET_FUNCTION void operator()(std::int32_t pack) const {
     const std::int32_t first = pack * kWidth;
-    const std::int32_t *a = pairs.a + first, *b = pairs.b + first;
-    const SegmentPair<R> pair = gather_pair<R>(places, a, b);
-    const PairContact<R> contact = find_contact(pair, R(reach));
-    const auto radius = [&](const std::int32_t* segment, R at) {
-      const R begin = gather_extra<R>(places.end, segment, 0),
-              end = gather_extra<R>(places.end, segment, kLanes);
-      return fma(at, end - begin, begin);
-    };
-    const R gap = contact.distance - (radius(a, contact.s) + radius(b, contact.u));
+    const PackOfPairs<R> gathered(places, pairs.a + first, pairs.b + first);
+    const SegmentPair<R> pair = gathered.places();
+    const R reach = gathered.largest_reach();
+    const PairContact<R> contact = find_contact(pair, reach, load_sides<R>(pairs.side + first));
+    const R gap = contact.distance - (gathered.a.extra_at(contact.s) + gathered.b.extra_at(contact.u));
     // Hair that rests on hair is a contact still when the last pass has put its place right.
-    const R touching = R(T(1e-2) * reach);
+    const R touching = R(T(1e-2)) * reach;
     std::uint32_t active = lane_bits((gap < touching) & (dot(contact.normal, contact.normal) > R(T(0.5))));
     if (pairs.count - first < kWidth) active &= ~(~0u << (pairs.count - first));
     for (int lane = 0; lane < kWidth; ++lane) pairs.active[first + lane] = active >> lane & 1;
@@ -106,13 +109,10 @@ struct WeighContacts {
     }
     const R s = load<R>(lanes[0]), u = load<R>(lanes[1]), gap = load<R>(lanes[8]);
     const Vector3<R> normal = load3<R>(lanes[2], kWidth), slip = load3<R>(lanes[5], kWidth);
-    const std::int32_t *a = pairs.a + first, *b = pairs.b + first;
-    const auto response = [&](const std::int32_t* segment, R at) {
-      const R begin = gather_extra<R>(velocity, segment, 0), end = gather_extra<R>(velocity, segment, kLanes);
-      return fma(at, end - begin, begin);
-    };
-    const R per_mass = inverse_or_zero(response(a, s) + response(b, u), R(T(1e-6)));
-    const Vector3<R> speed = gather_segment<R>(velocity, a).at(s) - gather_segment<R>(velocity, b).at(u);
+    const GatheredSegment<R> a = gather_segment<R>(velocity, pairs.a + first),
+                             b = gather_segment<R>(velocity, pairs.b + first);
+    const R per_mass = inverse_or_zero(a.extra_at(s) + b.extra_at(u), R(T(1e-6)));
+    const Vector3<R> speed = a.places.at(s) - b.places.at(u);
     const R mu(friction);
     store3<R>(lanes[2], kWidth, contact_impulse(normal, -gap, R(T(kRelaxation)), slip, mu, per_mass));
     store3<R>(lanes[5], kWidth,

@@ -2,9 +2,10 @@
 //
 // Locks of hair travel centimetres in a frame, neighbours against one another millimetres. Neighbours are
 // looked for along what is left of a segment's way without the mean motion, so that hair that moves together
-// costs no more than hair at rest. Two segments that meet are each moved by the mean motion where they are at
-// the end; the field is made so smooth that this is nearly the same, and the difference is known to be less
-// than its slope times their distance. Sums are of whole numbers: in any order the same.
+// costs no more than hair at rest. The field tells the displacement of what is at a place at the start. Of
+// two segments that meet each is carried by the field where it was; the difference is less than the field's
+// slope times how far the two moved against one another before they met, so the field is made smooth. Sums
+// are of whole numbers: in any order the same.
 #pragma once
 #include "kernels/contact/contact_data.h"
 
@@ -16,6 +17,12 @@ struct MotionLattice {
   float per_cell;  // [1/m]
   std::int32_t nodes[3];
 
+  static MotionLattice over(const float* low, const float* high, float cell) {
+    MotionLattice lattice{{low[0], low[1], low[2]}, 1 / cell, {}};
+    for (int c = 0; c < 3; ++c)
+      lattice.nodes[c] = static_cast<std::int32_t>((high[c] - low[c]) * lattice.per_cell) + 2;
+    return lattice;
+  }
   RINGLET_KERNEL std::int32_t number(std::int32_t x, std::int32_t y, std::int32_t z) const {
     return (z * nodes[1] + y) * nodes[0] + x;
   }
@@ -100,23 +107,20 @@ RINGLET_FUNCTION float steepness(const MotionLattice& lattice, const MotionNode*
   return most;
 }
 
-struct MeanMotion {
-  float mean[3];    // at a place [m]
-  float spread[3];  // how much it changes over a metre, at most [-]
-};
-
-// At a place near the hair: between the nodes about it that know.
-RINGLET_KERNEL MeanMotion mean_motion(const MotionLattice& lattice, const MotionNode* nodes,
-                                      const float* at) {
+// At a place near the hair [m]: between the nodes about it that know.
+RINGLET_KERNEL Vector3<float> mean_motion(const MotionLattice& lattice, const MotionNode* nodes,
+                                          Vector3<float> at) {
+  const float place[3] = {at.x, at.y, at.z};
   std::int32_t cell[3];
   float along[3];
   for (int c = 0; c < 3; ++c) {
-    const float place = max((at[c] - lattice.low[c]) * lattice.per_cell, 0.0f);
+    const float here = max((place[c] - lattice.low[c]) * lattice.per_cell, 0.0f);
     const std::int32_t last = lattice.nodes[c] - 2;
-    cell[c] = place < static_cast<float>(last) ? static_cast<std::int32_t>(place) : last;
-    along[c] = min(place - static_cast<float>(cell[c]), 1.0f);
+    cell[c] = here < static_cast<float>(last) ? static_cast<std::int32_t>(here) : last;
+    along[c] = min(here - static_cast<float>(cell[c]), 1.0f);
   }
-  float weights = 0, mean[3] = {}, low[3] = {}, high[3] = {};
+  float weights = 0;
+  Vector3<float> mean = zero3<float>();
   for (int corner = 0; corner < 8; ++corner) {
     const int x = corner & 1, y = corner >> 1 & 1, z = corner >> 2;
     const MotionNode& node = nodes[lattice.number(cell[0] + x, cell[1] + y, cell[2] + z)];
@@ -124,18 +128,10 @@ RINGLET_KERNEL MeanMotion mean_motion(const MotionLattice& lattice, const Motion
     const float weight =
         (x ? along[0] : 1 - along[0]) * (y ? along[1] : 1 - along[1]) * (z ? along[2] : 1 - along[2]) +
         1e-6f;  // never nothing
-    for (int c = 0; c < 3; ++c) {
-      low[c] = weights == 0 ? node.mean[c] : min(low[c], node.mean[c]);
-      high[c] = weights == 0 ? node.mean[c] : max(high[c], node.mean[c]);
-      mean[c] = fma(weight, node.mean[c], mean[c]);
-    }
+    mean = fma(weight, Vector3<float>{node.mean[0], node.mean[1], node.mean[2]}, mean);
     weights += weight;
   }
-  MeanMotion motion{};
-  if (weights == 0) return motion;
-  for (int c = 0; c < 3; ++c)
-    motion.mean[c] = mean[c] / weights, motion.spread[c] = (high[c] - low[c]) * lattice.per_cell;
-  return motion;
+  return weights > 0 ? (1 / weights) * mean : mean;
 }
 
 }  // namespace RINGLET_ISA

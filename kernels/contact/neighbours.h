@@ -1,5 +1,11 @@
 // The pairs of segments that contacts look at, found anew in each application.
+//
+// In dense hair most of what a segment would go through by the end it never gets to, where what it meets
+// first holds it; yet to look for all of it is most of the work. So the search has two rounds. In the first,
+// segments go no farther than a few of the hair's spacings against its mean motion; in the second, those that
+// have met few others go on to the end, among themselves.
 #pragma once
+#include "kernels/contact/box_sorter.h"
 #include "kernels/contact/pair_search.h"
 
 namespace ringlet::kernels {
@@ -13,297 +19,191 @@ class Neighbours {
   template <class V>
   using Buffer = typename Backend::template Buffer<V>;
 
-  // `strand`: [particles] the strand of the segment that begins there, -1 where none does. Returns how many
-  // pairs there are; they hold until the next call.
-  std::int32_t find(Backend& backend, const HairPlaces<T>& places, const std::int32_t* strand,
-                    std::int32_t particles, T reach) {
-    margin_ = T(kMarginReaches) * reach;
-    const float box_margin = static_cast<float>(margin_ + reach);
-    find_mean_motion(backend, places, strand, particles);
-    find_boxes(backend, places, strand, particles, box_margin);
-    fill_table(backend, places, strand, particles);
-    search(backend, places, strand, particles, reach, box_margin);
-    return gather_pairs(backend);
+  // Returns how many pairs there are; they hold until the next call. There is room for `more` behind them.
+  std::int32_t find(Backend& backend, const HairPlaces<T>& places, std::int32_t more) {
+    const HairExtent extent = find_extent(backend, places.start, places.strand, places.particles);
+    motion_.find(backend, places, extent);
+    thickest_ =
+        static_cast<T>(backend.largest("radius", places.particles, 0, [=] RINGLET_LAMBDA(std::int32_t p) {
+          return static_cast<double>(places.end[p].extra);
+        }));
+    const float spacing = find_spacing(backend, places, extent);
+    const SweptBoxes swept{extent,          motion_.carried(),      true,
+                           motion_.slope(), kFewSpacings * spacing, kPieceSpacings * spacing};
+    meetings_.resize(places.particles), last_round_.resize(places.particles);
+    search(backend, places, swept);
+    return gather_pairs(backend, more);
   }
 
   std::int32_t* a() { return a_.data(); }
   std::int32_t* b() { return b_.data(); }
   std::size_t bytes() const {
-    return sums_.bytes() + nodes_.bytes() + filled_.bytes() + box_.bytes() + key_.bytes() + order_.bytes() +
-           first_.bytes() + segment_.bytes() + strand_.bytes() + components_.bytes() + pool_.bytes() +
-           next_.bytes() + last_.bytes() + count_.bytes() + kept_.bytes() + a_.bytes() + b_.bytes();
+    std::size_t rounds = 0;
+    for (const auto& round : rounds_) rounds += round.bytes();
+    return rounds + motion_.bytes() + sorter_.bytes() + crowd_.bytes() + meetings_.bytes() + hits_.bytes() +
+           last_round_.bytes() + kept_.bytes() + ranks_.bytes() + a_.bytes() + b_.bytes();
   }
 
  private:
-  // What counts as near, in sums of radii: about as far as contacts move hair in an application.
-  static constexpr double kMarginReaches = 4;
-  static constexpr int kLatticeCells = 8;   // of the mean motion, along the longest axis
-  static constexpr float kSteepest = 0.2f;  // slope of the mean motion that is aimed at [-]
-  static constexpr int kSmoothings = 48;
+  static constexpr int kRounds = 4;
+  // Another round is not begun where it would be more work than this: hits are some 8 times those of the one
+  // before, which went a quarter as far.
+  static constexpr double kMostHits = 1 << 24, kHitsGrow = 8;
+  static constexpr float kFewSpacings = 0.08f, kPieceSpacings = 3, kFartherEachRound = 4;
+  static constexpr std::int32_t kFewNeighbours = 4;
+  static constexpr int kSearchChunk = 4;  // groups
 
-  // Lowest and highest of f(particle)[axis] over particles with a segment.
-  template <class Values>
-  void find_bounds(Backend& backend, const std::int32_t* strand, std::int32_t particles, const Values& values,
-                   float* low, float* high) {
-    for (int c = 0; c < 3; ++c) {
-      high[c] = static_cast<float>(
-          backend.largest("contact bounds", particles, -1e30, [=] RINGLET_LAMBDA(std::int32_t p) {
-            return strand[p] < 0 ? -1e30 : static_cast<double>(values(p, c));
-          }));
-      low[c] = static_cast<float>(
-          -backend.largest("contact bounds", particles, -1e30, [=] RINGLET_LAMBDA(std::int32_t p) {
-            return strand[p] < 0 ? -1e30 : -static_cast<double>(values(p, c));
-          }));
-    }
-  }
-
-  void make_lattice(Backend& backend, const HairPlaces<T>& places, const std::int32_t* strand,
-                    std::int32_t particles) {
-    float high[3];
-    find_bounds(
-        backend, strand, particles,
-        [=] RINGLET_LAMBDA(std::int32_t p, int c) { return (&places.end[p].x)[c]; }, lattice_.low, high);
-    float size = 1e-3f;
-    for (int c = 0; c < 3; ++c) size = max(size, high[c] - lattice_.low[c]);
-    lattice_.per_cell = static_cast<float>(kLatticeCells) / size;
-    for (int c = 0; c < 3; ++c)
-      lattice_.nodes[c] = static_cast<std::int32_t>((high[c] - lattice_.low[c]) * lattice_.per_cell) + 2;
-  }
-
-  void find_mean_motion(Backend& backend, const HairPlaces<T>& places, const std::int32_t* strand,
-                        std::int32_t particles) {
-    make_lattice(backend, places, strand, particles);
-    const MotionLattice lattice = lattice_;
-    sums_.resize(lattice.total()), nodes_.resize(lattice.total()), filled_.resize(lattice.total());
-    MotionSum* sums = sums_.data();
-    backend.parallel_for("clear motion", lattice.total(),
-                         [=] RINGLET_LAMBDA(std::int32_t k) { sums[k] = MotionSum{}; });
-    backend.parallel_for("sum motion", particles, [=] RINGLET_LAMBDA(std::int32_t p) {
-      if (strand[p] < 0) return;
-      const Place<T>&end = places.end[p], &start = places.start[p];
-      std::int32_t node[3];
-      for (int c = 0; c < 3; ++c) node[c] = lattice.nearest(c, static_cast<float>((&end.x)[c]));
-      MotionSum& sum = sums[lattice.number(node[0], node[1], node[2])];
+  // Of one hair to the next, where most of the hair is [m]: counted in cells as wide as a segment is long,
+  // which far ones share.
+  float find_spacing(Backend& backend, const HairPlaces<T>& places, const HairExtent& extent) {
+    constexpr std::int32_t kAcross = 64, kCells = kAcross * kAcross * kAcross;
+    crowd_.resize(kCells);
+    std::int32_t* crowd = crowd_.data();
+    const float cell = 2 * extent.segment_length;
+    const MotionLattice lattice{
+        {extent.low[0], extent.low[1], extent.low[2]}, 1 / cell, {1 << 20, 1 << 20, 1 << 20}};
+    const auto cell_of = [=] RINGLET_LAMBDA(std::int32_t p) {
+      std::int32_t number = 0;
       for (int c = 0; c < 3; ++c)
-        atomic_add(&sum.displacement[c],
-                   static_cast<std::int64_t>(((&end.x)[c] - (&start.x)[c]) * (1 / kMotionUnit)));
-      atomic_add(&sum.count, std::int64_t{1});
-    });
-    MotionNode* nodes = nodes_.data();
-    backend.parallel_for("mean motion", lattice.total(),
-                         [=] RINGLET_LAMBDA(std::int32_t k) { nodes[k] = mean_of(sums[k]); });
-    const auto sweep = [&](const char* name, int sweeps, const auto& change) {
-      for (int k = 0; k < sweeps; ++k) {
-        const MotionNode* from = nodes_.data();
-        MotionNode* to = filled_.data();
-        backend.parallel_for(name, lattice.total(),
-                             [=] RINGLET_LAMBDA(std::int32_t node) { to[node] = change(from, node); });
-        nodes_.swap(filled_);
-      }
+        number = number * kAcross +
+                 (lattice.nearest(c, static_cast<float>((&places.start[p].x)[c])) & (kAcross - 1));
+      return number;
     };
-    sweep("fill motion", kLatticeCells, [=] RINGLET_LAMBDA(const MotionNode* from, std::int32_t node) {
-      return from[node].known ? from[node] : mean_of_neighbours(lattice, from, node);
+    backend.parallel_for("clear crowd", kCells, [=] RINGLET_LAMBDA(std::int32_t k) { crowd[k] = 0; });
+    backend.parallel_for("crowd", places.particles, [=] RINGLET_LAMBDA(std::int32_t p) {
+      if (places.strand[p] >= 0) atomic_add(&crowd[cell_of(p)], 1);
     });
-    const float most = kSteepest / lattice.per_cell;
-    sweep("smooth motion", kSmoothings, [=] RINGLET_LAMBDA(const MotionNode* from, std::int32_t node) {
-      return less_steep(lattice, from, node, most);
+    const double segments = backend.sum(
+        "segments", kCells, [=] RINGLET_LAMBDA(std::int32_t k) { return static_cast<double>(crowd[k]); });
+    const double with_each = backend.sum("crowds", kCells, [=] RINGLET_LAMBDA(std::int32_t k) {
+      return static_cast<double>(crowd[k]) * crowd[k];
     });
-    const MotionNode* smooth = nodes_.data();
-    const double left = backend.largest("steepness", lattice.total(), 0, [=] RINGLET_LAMBDA(std::int32_t k) {
-      return static_cast<double>(steepness(lattice, smooth, k));
-    });
-    slope_ = static_cast<float>(left) * lattice.per_cell;
+    const double length_there = with_each / max(segments, 1.0) * static_cast<double>(extent.segment_length);
+    return cell * static_cast<float>(sqrt(static_cast<double>(cell) / max(length_there, 1e-12)));
   }
 
-  void find_boxes(Backend& backend, const HairPlaces<T>& places, const std::int32_t* strand,
-                  std::int32_t particles, float margin) {
-    box_.resize(particles);
-    Box* boxes = box_.data();
-    const MotionLattice lattice = lattice_;
-    const MotionNode* nodes = nodes_.data();
-    const float slope = min(slope_, 0.9f);
-    backend.parallel_for("contact boxes", particles, [=] RINGLET_LAMBDA(std::int32_t p) {
-      if (strand[p] >= 0) boxes[p] = swept_box(places, p, lattice, nodes, slope, margin);
-    });
-  }
-
-  // Holds the segment's places at the end, and at the start moved along with the mean motion.
-  RINGLET_FUNCTION static Box swept_box(const HairPlaces<T>& places, std::int32_t p,
-                                        const MotionLattice& lattice, const MotionNode* nodes, float slope,
-                                        float margin) {
-    const auto vector = [](const Place<T>& at) {
-      return Vector3<float>{static_cast<float>(at.x), static_cast<float>(at.y), static_cast<float>(at.z)};
-    };
-    const Segment<float> end{vector(places.end[p]), vector(places.end[p + kLanes])},
-        start{vector(places.start[p]), vector(places.start[p + kLanes])};
-    const auto pieces = static_cast<int>(min(length(end.along()) * lattice.per_cell, 64.0f)) + 1;
-    Box box{{3e38f, 3e38f, 3e38f}, {-3e38f, -3e38f, -3e38f}};
-    float spread[3] = {}, apart = 0;
-    for (int k = 0; k <= pieces; ++k) {
-      const float s = static_cast<float>(k) / static_cast<float>(pieces);
-      const Vector3<float> now = end.at(s), then = start.at(s);
-      const float last[3] = {now.x, now.y, now.z}, first[3] = {then.x, then.y, then.z};
-      const MeanMotion motion = mean_motion(lattice, nodes, last);
-      for (int c = 0; c < 3; ++c) {
-        const float moved = first[c] + motion.mean[c];
-        box.low[c] = min(box.low[c], min(moved, last[c]));
-        box.high[c] = max(box.high[c], max(moved, last[c]));
-        spread[c] = max(spread[c], motion.spread[c]), apart = max(apart, abs(moved - last[c]));
-      }
+  void search(Backend& backend, const HairPlaces<T>& places, SweptBoxes swept) {
+    signed char* last_round = last_round_.data();
+    std::int32_t* meetings = meetings_.data();
+    const Place<float>* carried = swept.carried;
+    backend.parallel_for("all look", places.particles,
+                         [=] RINGLET_LAMBDA(std::int32_t p) { last_round[p] = 0, meetings[p] = 0; });
+    for (int round = 0; round < kRounds; ++round) {
+      swept.from_anywhere = round == 0;
+      const double hits = search_round(backend, round, places, swept);
+      rounds_taken_ = round + 1;
+      if (round > 0 && kHitsGrow * hits > kMostHits) return;
+      const float farthest = swept.farthest;
+      backend.parallel_for("who goes on", places.particles, [=] RINGLET_LAMBDA(std::int32_t p) {
+        const bool goes_on =
+            places.strand[p] >= 0 && last_round[p] == round &&
+            (meetings[p] < kCrossing || meetings[p] % kCrossing < kFewNeighbours) &&
+            (is_far(places, carried, p, farthest) || is_far(places, carried, p + 1, farthest));
+        if (goes_on) last_round[p] = static_cast<signed char>(round + 1);
+        meetings[p] = 0;
+      });
+      swept.farthest = round + 2 < kRounds ? kFartherEachRound * swept.farthest : 3e18f;
     }
-    // A neighbour that it meets is as far away at the end as both have left the mean motion, and that much
-    // more as the mean motion differs between them; within their own lengths by the slope just here.
-    const float beyond = slope / (1 - slope) * apart, half = box.half_size();
-    for (int c = 0; c < 3; ++c) {
-      const float more = min(spread[c], slope) * half + beyond + 0.5f * margin;
-      box.low[c] -= more, box.high[c] += more;
+  }
+
+  RINGLET_KERNEL static bool is_far(const HairPlaces<T>& places, const Place<float>* carried, std::int32_t p,
+                                    float farthest) {
+    const Vector3<float> way = float_vector(places.end[p]) - vector_of(carried[p]);
+    return !(dot(way, way) <= farthest * farthest);
+  }
+
+  // Returns how many pairs of boxes met.
+  double search_round(Backend& backend, int round, const HairPlaces<T>& places, const SweptBoxes& swept) {
+    const signed char* last_round = last_round_.data();
+    const BoxTable table = sorter_.sort(
+        backend, places, swept, [=] RINGLET_LAMBDA(std::int32_t p) { return last_round[p] == round; });
+    if (table.boxes == 0) return 0;
+    const std::int32_t groups = (table.boxes + kGroupPieces - 1) / kGroupPieces;
+    hits_.resize(groups);
+    std::int32_t *meetings = meetings_.data(), *hits = hits_.data();
+    rounds_[round].fill(backend, groups, [&](const PairPool& pool) {
+      backend.parallel_for("clear meetings", places.particles,
+                           [=] RINGLET_LAMBDA(std::int32_t p) { meetings[p] = 0; });
+      const T far = T(2 * swept.along_both()) + 2 * T(kNear) * thickest_;
+      const PairSearch<F, R> search{table, places, swept.carried, far, meetings, hits, pool};
+      backend.parallel_for("contact pairs", groups, search, kSearchChunk);
+    });
+    return backend.sum("hits", groups,
+                       [=] RINGLET_LAMBDA(std::int32_t k) { return static_cast<double>(hits[k]); });
+  }
+
+  struct FoundPairs {
+    PairPool pool[kRounds];
+    std::int32_t first[kRounds];  // group of each round
+    int rounds, limit;
+    const signed char* last_round;
+
+    // Calls visit(pair) for what is kept of a group. What two found that both went on they found again.
+    template <class Visit>
+    RINGLET_KERNEL void for_kept(std::int32_t group, const Visit& visit) const {
+      int round = rounds - 1;
+      while (group < first[round]) --round;
+      pool[round].for_pairs(group - first[round], [&](const RankedPair& pair) {
+        if (pair.rank < limit && (last_round[pair.a] <= round || last_round[pair.b] <= round)) visit(pair);
+      });
     }
-    return box;
-  }
+  };
 
-  void fill_table(Backend& backend, const HairPlaces<T>& places, const std::int32_t* strand,
-                  std::int32_t particles) {
-    const Box* boxes = box_.data();
-    const double segments = backend.sum("contact segments", particles, [=] RINGLET_LAMBDA(std::int32_t p) {
-      return strand[p] < 0 ? 0.0 : 1.0;
-    });
-    const double sizes = backend.sum("contact sizes", particles, [=] RINGLET_LAMBDA(std::int32_t p) {
-      return strand[p] < 0 ? 0.0 : static_cast<double>(boxes[p].half_size());
-    });
-    float low[3], high[3];
-    find_bounds(
-        backend, strand, particles,
-        [=] RINGLET_LAMBDA(std::int32_t p, int c) { return 0.5f * (boxes[p].low[c] + boxes[p].high[c]); },
-        low, high);
-    table_.boxes = static_cast<std::int32_t>(segments);
-    table_.levels =
-        BoxLevels::make(low, high, static_cast<float>(sizes / (segments > 0 ? segments : 1)), table_.boxes);
-    sort_boxes(backend, strand, particles);
-    order_cells(backend, places);
-    gather_boxes(backend, places, strand);
-  }
-
-  void sort_boxes(Backend& backend, const std::int32_t* strand, std::int32_t particles) {
-    const std::int32_t cells = table_.levels.total_cells;
-    key_.resize(particles), order_.resize(particles), first_.resize(cells + 1);
-    std::uint64_t* keys = key_.data();
-    std::uint32_t* order = order_.data();
-    const Box* boxes = box_.data();
-    const BoxLevels levels = table_.levels;
-    backend.parallel_for("contact cells", particles, [=] RINGLET_LAMBDA(std::int32_t p) {
-      keys[p] = static_cast<std::uint64_t>(strand[p] < 0 ? cells : levels.cell_of(boxes[p]));
-      order[p] = static_cast<std::uint32_t>(p);
-    });
-    int bits = 1;
-    while (cells >> bits) ++bits;
-    backend.sort("sort contacts", key_, order_, particles, bits);
-    std::int32_t* first = first_.data();
-    const std::uint64_t* sorted = key_.data();
-    backend.parallel_for("contact cell starts", particles, [=] RINGLET_LAMBDA(std::int32_t k) {
-      const auto here = static_cast<std::int32_t>(sorted[k]);
-      for (std::int32_t cell = k == 0 ? 0 : static_cast<std::int32_t>(sorted[k - 1]) + 1; cell <= here;
-           ++cell)
-        first[cell] = k;
-      if (k + 1 < particles) return;
-      for (std::int32_t cell = here + 1; cell <= cells; ++cell) first[cell] = particles;
-    });
-  }
-
-  void order_cells(Backend& backend, const HairPlaces<T>& places) {
-    std::uint32_t* order = order_.data();
-    const std::int32_t* first = first_.data();
-    const Place<T>* end = places.end;
-    backend.parallel_for("order contact cells", table_.levels.total_cells,
-                         [=] RINGLET_LAMBDA(std::int32_t cell) {
-                           for (std::int32_t k = first[cell] + 1; k < first[cell + 1]; ++k) {
-                             const std::uint32_t moved = order[k];
-                             std::int32_t to = k;
-                             for (; to > first[cell]; --to) {
-                               if (comes_first(end, static_cast<std::int32_t>(order[to - 1]),
-                                               static_cast<std::int32_t>(moved)))
-                                 break;
-                               order[to] = order[to - 1];
-                             }
-                             order[to] = moved;
-                           }
-                         });
-  }
-
-  void gather_boxes(Backend& backend, const HairPlaces<T>& places, const std::int32_t* strand) {
-    // Whole blocks, for packs read past the end.
-    const std::int32_t boxes = table_.boxes,
-                       room = (boxes + BoxTable::kBlock - 1) / BoxTable::kBlock * BoxTable::kBlock;
-    segment_.resize(boxes), strand_.resize(boxes);
-    components_.resize(static_cast<std::size_t>(room) * kBoxComponents);
-    float* components = components_.data();
-    std::int32_t *segments = segment_.data(), *strands = strand_.data();
-    const std::uint32_t* order = order_.data();
-    const Box* box = box_.data();
-    backend.parallel_for("gather boxes", room, [=] RINGLET_LAMBDA(std::int32_t k) {
-      const auto put = [&](int which, float value) { components[BoxTable::at(which, k)] = value; };
-      if (k >= boxes) {
-        for (int c = 0; c < kBoxComponents; ++c) put(c, 3e38f);
-        return;
-      }
-      const auto p = static_cast<std::int32_t>(order[k]);
-      segments[k] = p, strands[k] = strand[p];
-      for (int c = 0; c < 3; ++c) {
-        put(kLow + c, box[p].low[c]), put(kHigh + c, box[p].high[c]);
-        const float start = static_cast<float>((&places.start[p].x)[c]),
-                    end = static_cast<float>((&places.end[p].x)[c]);
-        put(kStartBegin + c, start), put(kEndBegin + c, end);
-        put(kStartAlong + c, static_cast<float>((&places.start[p + kLanes].x)[c]) - start);
-        put(kEndAlong + c, static_cast<float>((&places.end[p + kLanes].x)[c]) - end);
-      }
-    });
-    table_.first = first_.data(), table_.segment = segments, table_.strand = strands;
-    table_.components = components;
-  }
-
-  // Again with more memory where the pool was too small.
-  void search(Backend& backend, const HairPlaces<T>& places, const std::int32_t* strand,
-              std::int32_t particles, T reach, float box_margin) {
-    groups_ = (table_.boxes + kGroupSegments - 1) / kGroupSegments;
-    last_.resize(groups_), count_.resize(groups_), kept_.resize(groups_ + 1);
-    taken_.resize(1), ranks_.resize(kMostPairs);
-    std::int32_t needed = groups_ + groups_ / 2 + 1;
-    do {
-      if (static_cast<std::size_t>(needed) > next_.size())
-        next_.resize(needed), pool_.resize(static_cast<std::size_t>(needed) * kPairBlock);
-      std::int32_t *taken = taken_.data(), *ranks = ranks_.data();
-      backend.parallel_for("clear pool", kMostPairs,
-                           [=] RINGLET_LAMBDA(std::int32_t rank) { *taken = ranks[rank] = 0; });
-      const PairPool pool{pool_.data(), next_.data(),  taken, static_cast<std::int32_t>(next_.size()),
-                          last_.data(), count_.data(), ranks};
-      const PairSearch<F, R> work{table_, places, strand, particles, box_margin, margin_, reach, pool};
-      backend.parallel_for("contact pairs", groups_, work, kSearchChunk);
-      needed = static_cast<std::int32_t>(backend.largest(
-          "pool", 1, 0, [=] RINGLET_LAMBDA(std::int32_t) { return static_cast<double>(*taken); }));
-    } while (needed > static_cast<std::int32_t>(next_.size()));
-  }
-
-  // Calls visit(pair, its number among the group's) for those of a group's pairs that have a lower rank.
-  template <class Visit>
-  RINGLET_KERNEL static void for_ranked(const PairPool& pool, std::int32_t group, std::int32_t rank,
-                                        const Visit& visit) {
-    std::int32_t number = 0;
-    for (std::int32_t block = pool.last[group], count = pool.count[group]; count > 0;
-         block = pool.next[block]) {
-      const std::int32_t from = (count - 1) / kPairBlock * kPairBlock;
-      for (std::int32_t k = from; k < count; ++k) {
-        const RankedPair& pair = pool.pairs[static_cast<std::int64_t>(block) * kPairBlock + k - from];
-        if (pair.rank < rank) visit(pair, number++);
-      }
-      count = from;
+  // Those of all rounds in one list, in the order of the tables. What the first found of two that went on the
+  // second found again.
+  std::int32_t gather_pairs(Backend& backend, std::int32_t more) {
+    const std::int32_t limit = rank_limit(backend);
+    std::int32_t groups = 0;
+    FoundPairs found{};
+    for (int round = 0; round < rounds_taken_; ++round) {
+      found.pool[round] = rounds_[round].pool(), found.first[round] = groups;
+      groups += rounds_[round].groups();
     }
+    found.rounds = rounds_taken_, found.limit = limit, found.last_round = last_round_.data();
+    kept_.resize(groups + 1);
+    std::int32_t* kept = kept_.data();
+    backend.parallel_for(
+        "count pairs", groups + 1,
+        [=] RINGLET_LAMBDA(std::int32_t group) {
+          kept[group] = 0;
+          if (group < groups) found.for_kept(group, [&](const RankedPair&) { ++kept[group]; });
+        },
+        kSearchChunk);
+    const std::int32_t pairs = backend.scan("start pairs", kept_, groups + 1);
+    constexpr int kPad = 16;
+    a_.resize(pairs + more + kPad), b_.resize(pairs + more + kPad);
+    std::int32_t *a = a_.data(), *b = b_.data();
+    backend.parallel_for(
+        "gather pairs", groups,
+        [=] RINGLET_LAMBDA(std::int32_t group) {
+          std::int32_t at = kept[group];
+          found.for_kept(group, [&](const RankedPair& pair) { a[at] = pair.a, b[at] = pair.b, ++at; });
+        },
+        kSearchChunk);
+    return pairs;
   }
 
   // The rank from which on pairs are left out, so that no more than kMostLookedAt remain.
   std::int32_t rank_limit(Backend& backend) {
+    ranks_.resize(kRanks);
     std::int32_t* ranks = ranks_.data();
+    backend.parallel_for("clear ranks", kRanks, [=] RINGLET_LAMBDA(std::int32_t rank) { ranks[rank] = 0; });
+    for (int taken = 0; taken < rounds_taken_; ++taken) {
+      const PairMemory<Backend>& round = rounds_[taken];
+      const PairPool pool = round.pool();
+      backend.parallel_for(
+          "count ranks", round.groups(),
+          [=] RINGLET_LAMBDA(std::int32_t group) {
+            std::int32_t own[kRanks] = {};
+            pool.for_pairs(group, [&](const RankedPair& pair) { ++own[pair.rank]; });
+            for (int rank = 0; rank < kRanks; ++rank)
+              if (own[rank] > 0) atomic_add(&ranks[rank], own[rank]);
+          },
+          kSearchChunk);
+    }
     return static_cast<std::int32_t>(backend.largest("ranks", 1, 0, [=] RINGLET_LAMBDA(std::int32_t) {
       std::int32_t rank = 0;
-      for (std::int64_t pairs = 0; rank < kMostPairs; ++rank) {
+      for (std::int64_t pairs = 0; rank < kRanks; ++rank) {
         pairs += ranks[rank];
         if (rank >= kLeastPairs && pairs > kMostLookedAt) break;
       }
@@ -311,53 +211,18 @@ class Neighbours {
     }));
   }
 
-  // From the groups' blocks into one list, in the order of the table.
-  std::int32_t gather_pairs(Backend& backend) {
-    const std::int32_t groups = groups_, limit = rank_limit(backend);
-    const PairPool pool{pool_.data(), next_.data(), nullptr, 0, last_.data(), count_.data(), nullptr};
-    std::int32_t* kept = kept_.data();
-    backend.parallel_for(
-        "count pairs", groups + 1,
-        [=] RINGLET_LAMBDA(std::int32_t group) {
-          kept[group] = 0;
-          if (group < groups)
-            for_ranked(pool, group, limit, [&](const RankedPair&, std::int32_t) { ++kept[group]; });
-        },
-        kSearchChunk);
-    const std::int32_t pairs = backend.scan("start pairs", kept_, groups + 1);
-    constexpr int kPad = 16;
-    a_.resize(pairs + kPad), b_.resize(pairs + kPad);
-    std::int32_t *a = a_.data(), *b = b_.data();
-    backend.parallel_for(
-        "gather pairs", groups,
-        [=] RINGLET_LAMBDA(std::int32_t group) {
-          for_ranked(pool, group, limit, [&](const RankedPair& pair, std::int32_t number) {
-            a[kept[group] + number] = pair.a, b[kept[group] + number] = pair.b;
-          });
-        },
-        kSearchChunk);
-    return pairs;
-  }
+  // Where there are more pairs, each piece looks at fewer of its own, those that matter most; never at fewer
+  // than kLeastPairs.
+  static constexpr std::int64_t kMostLookedAt = 1 << 18;
+  static constexpr std::int32_t kLeastPairs = 1;
 
-  // Where there are more pairs, in dense hair that moves far in a frame, each segment looks at fewer of its
-  // own, those that matter most; never at fewer than kLeastPairs.
-  static constexpr std::int64_t kMostLookedAt = 1 << 19;
-  static constexpr std::int32_t kLeastPairs = 2;
-  static constexpr int kSearchChunk = 8;  // groups
-
-  T margin_ = T(0);
-  MotionLattice lattice_{};
-  float slope_ = 0;  // of the mean motion, at most [-]
-  BoxTable table_{};
-  std::int32_t groups_ = 0;
-  Buffer<MotionSum> sums_;
-  Buffer<MotionNode> nodes_, filled_;
-  Buffer<Box> box_;
-  Buffer<std::uint64_t> key_;
-  Buffer<std::uint32_t> order_;
-  Buffer<std::int32_t> first_, segment_, strand_, next_, last_, count_, kept_, taken_, ranks_, a_, b_;
-  Buffer<float> components_;
-  Buffer<RankedPair> pool_;
+  MotionField<Backend, T> motion_;
+  BoxSorter<Backend, T> sorter_;
+  PairMemory<Backend> rounds_[kRounds];
+  int rounds_taken_ = 0;
+  T thickest_ = T(0);  // radius [m]
+  Buffer<std::int32_t> crowd_, meetings_, hits_, kept_, ranks_, a_, b_;
+  Buffer<signed char> last_round_;  // [particles] that each segment looks in
 };
 
 }  // namespace RINGLET_ISA

@@ -1,49 +1,14 @@
 // Pairs of segments that touch, have crossed, or may do so when others' contacts move them.
 #pragma once
 #include "kernels/contact/box_table.h"
+#include "kernels/contact/pair_pool.h"
 
 namespace ringlet::kernels {
 inline namespace RINGLET_ISA {
 
-// Pairs in memory while they are found. Each group of segments fills blocks of its own, taken from the pool
-// one by one.
-inline constexpr int kPairBlock = 256, kGroupSegments = 32;
+inline constexpr std::int32_t kCrossing = 1 << 16;
 
-// Of one segment, with those that come after it in the table.
-inline constexpr int kMostPairs = 48;
-
-// `rank`: among a's pairs, by how much they matter.
-struct RankedPair {
-  std::int32_t a, b, rank;
-};
-
-struct PairPool {
-  RankedPair* pairs;    // [blocks][kPairBlock]
-  std::int32_t* next;   // [blocks] the group's block before it, -1: none
-  std::int32_t* taken;  // blocks, also of those that there was no memory for
-  std::int32_t blocks;
-  std::int32_t* last;   // [groups] the group's last block
-  std::int32_t* count;  // [groups]
-  std::int32_t* ranks;  // [kMostPairs] how many pairs have each
-};
-
-struct PairWriter {
-  const PairPool& pool;
-  std::int32_t block = -1, count = 0, ranks[kMostPairs] = {};
-
-  RINGLET_KERNEL void add(const RankedPair& pair) {
-    ++ranks[pair.rank];
-    if (count % kPairBlock == 0) {
-      const std::int32_t fresh = atomic_add(pool.taken, 1);
-      if (fresh < pool.blocks) pool.next[fresh] = block, block = fresh;
-      if (fresh >= pool.blocks) block = -1;
-    }
-    if (block >= 0) pool.pairs[static_cast<std::int64_t>(block) * kPairBlock + count % kPairBlock] = pair;
-    ++count;
-  }
-};
-
-// Looks for the pairs of one group of segments of the table. F: the pack that boxes are compared by; R: the
+// Looks for the pairs of one group of pieces of the table. F: the pack that boxes are compared by; R: the
 // one that pairs are looked at by.
 template <class F, class R>
 struct PairSearch {
@@ -52,135 +17,213 @@ struct PairSearch {
 
   BoxTable table;
   HairPlaces<T> places;
-  const std::int32_t* strand;  // [particles] of the segment that begins there
-  std::int32_t particles;
-  float box_margin;  // boxes farther apart than this at both times, along an axis, are left out [m]
-  T margin;          // as segments are that are farther apart at the end, of those that have not crossed [m]
-  T reach;           // the largest sum of radii [m]
+  const Place<float>* carried;  // see MotionField
+  T far;  // lines are left out that are farther apart at the start, but for how they stray [m]
+  std::int32_t*
+      meetings;  // [particles] how many pairs each segment is in, and kCrossing more for each that crosses
+  std::int32_t* hits;  // [groups] pairs of boxes that met
   PairPool pool;
 
   RINGLET_FUNCTION void operator()(std::int32_t group) const {
     PairWriter writer{pool};
-    const std::int32_t begin = group * kGroupSegments,
-                       end = table.boxes - begin < kGroupSegments ? table.boxes : begin + kGroupSegments;
-    Work work{{}, {}, writer};
-    for (std::int32_t i = begin; i < end; ++i) search(i, work);
+    const std::int32_t begin = group * kGroupPieces,
+                       end = table.boxes - begin < kGroupPieces ? table.boxes : begin + kGroupPieces;
+    Work work{{}, {}, {}, {}, writer};
+    for (std::int32_t i = begin; i < end;) {
+      std::int32_t next = i + 1;
+      while (next < end && table.cell[next] == table.cell[i]) ++next;
+      search_cell(i, next, work);
+      i = next;
+    }
     look_at(work);
     write(work);
+    hits[group] = work.hits.total;
     pool.last[group] = writer.block, pool.count[group] = writer.count;
-    for (std::int32_t rank = 0; rank < kMostPairs; ++rank)
-      if (writer.ranks[rank] > 0) atomic_add(&pool.ranks[rank], writer.ranks[rank]);
   }
 
  private:
-  // Pairs waiting until there are enough for a pack.
+  // Where on its segment a piece is, in its lengths.
+  struct PieceRange {
+    T middle, half;
+    RINGLET_KERNEL explicit PieceRange(const Piece& piece)
+        : middle((T(piece.number) + T(0.5)) / T(piece.pieces)), half(T(0.51) / T(piece.pieces)) {}
+  };
+
+  // Of the table, to look through.
+  struct Runs {
+    static constexpr int kRoom = 256;
+    std::int32_t begin[kRoom], end[kRoom];
+    int count = 0;
+  };
+  // The pieces whose boxes one piece's box meets.
+  struct Hits {
+    static constexpr int kRoom = 256;
+    std::int32_t segment[kRoom], piece[kRoom];
+    int count = 0;
+    std::int32_t total = 0;
+  };
+  // Pairs of pieces waiting until there are enough for a pack.
   struct Suspects {
     static constexpr int kRoom = 256;
-    std::int32_t a[kRoom], b[kRoom];
+    std::int32_t a[kRoom], b[kRoom], a_piece[kRoom], b_piece[kRoom];
     int count = 0;
   };
 
-  // The pairs of one segment that matter most: what it met earliest on its way, then what it is nearest to.
-  // In dense hair that moves far in a frame a segment would meet dozens of others, all but the first of which
-  // it never gets to where those hold it.
+  // The pairs of one piece that matter most: what it met earliest on its way, then what it is nearest to.
   struct Chosen {
-    std::int32_t a = -1, count = 0, b[kMostPairs];
-    T key[kMostPairs], beyond[kMostPairs];
+    std::int32_t piece = -1, a = -1, count = 0, b[kMostPairs];
+    T key[kMostPairs];
 
-    RINGLET_KERNEL void offer(std::int32_t other, T its_key, T its_beyond) {
+    RINGLET_KERNEL void offer(std::int32_t other, T its_key) {
       if (count == kMostPairs && !(its_key < key[count - 1])) return;
       std::int32_t at = count < kMostPairs ? count++ : count - 1;
-      for (; at > 0 && its_key < key[at - 1]; --at)
-        key[at] = key[at - 1], b[at] = b[at - 1], beyond[at] = beyond[at - 1];
-      key[at] = its_key, b[at] = other, beyond[at] = its_beyond;
+      for (; at > 0 && its_key < key[at - 1]; --at) key[at] = key[at - 1], b[at] = b[at - 1];
+      key[at] = its_key, b[at] = other;
     }
   };
 
-  RINGLET_KERNEL F component(int which, std::int32_t at) const {
-    return load<F>(table.components + BoxTable::at(which, at));
-  }
-  RINGLET_KERNEL Segment<F> segments(int begin, int along, std::int32_t at) const {
-    const Vector3<F> from{component(begin, at), component(begin + 1, at), component(begin + 2, at)};
-    return {from,
-            from + Vector3<F>{component(along, at), component(along + 1, at), component(along + 2, at)}};
-  }
-  // One of the table, the same in all lanes.
-  RINGLET_KERNEL static Segment<F> segment(const float* own, int begin, int along) {
-    const Vector3<F> from{F(own[begin]), F(own[begin + 1]), F(own[begin + 2])};
-    return {from, from + Vector3<F>{F(own[along]), F(own[along + 1]), F(own[along + 2])}};
-  }
-
   struct Work {
+    Runs runs;
+    Hits hits;
     Suspects suspects;
     Chosen chosen;
     PairWriter& writer;
   };
 
-  RINGLET_FUNCTION void search(std::int32_t i, Work& work) const {
-    float own[kBoxComponents];
-    for (int k = 0; k < kBoxComponents; ++k) own[k] = table.components[BoxTable::at(k, i)];
-    const Box box{{own[kLow], own[kLow + 1], own[kLow + 2]}, {own[kHigh], own[kHigh + 1], own[kHigh + 2]}};
-    const Segment<F> start = segment(own, kStartBegin, kStartAlong), end = segment(own, kEndBegin, kEndAlong);
-    const int own_level = table.levels.level_of(box.half_size());
+  RINGLET_KERNEL F corner(int which, std::int32_t at) const {
+    return load<F>(table.corners + BoxTable::at(which, at));
+  }
+
+  // Pieces [begin, end) of one cell, which look in the same runs of the table.
+  RINGLET_FUNCTION void search_cell(std::int32_t begin, std::int32_t end, Work& work) const {
+    Box all = box_at(begin);
+    for (std::int32_t i = begin + 1; i < end; ++i) {
+      const Box box = box_at(i);
+      for (int c = 0; c < 3; ++c)
+        all.low[c] = min(all.low[c], box.low[c]), all.high[c] = max(all.high[c], box.high[c]);
+    }
+    Runs& runs = work.runs;
+    const int own_level = table.levels.level_of(box_at(begin).half_size());
     for (int level = own_level; level < kLevels; ++level)
-      for_runs(table, level, box, [&](std::int32_t begin, std::int32_t finish) {
-        if (level == own_level && begin <= i) begin = i + 1;  // a pair is found from its first box on
-        for (std::int32_t j = begin & ~(kBoxes - 1); j < finish; j += kBoxes) {
-          std::uint32_t near = lane_bits(overlaps(own, j));
-          if (j < begin) near &= ~0u << (begin - j);
-          if (finish - j < kBoxes) near &= ~(~0u << (finish - j));
-          if (near == 0) continue;
-          near &= lane_bits(may_meet(start, end, j));
-          for (; near; near &= near - 1) suspect(i, j + __builtin_ctz(near), work);
-        }
+      for_runs(table, level, all, [&](std::int32_t from, std::int32_t to) {
+        // A pair is found from its first piece on: what is before these has looked for them.
+        if (level == own_level && from < begin) from = begin;
+        if (from >= to) return;
+        runs.begin[runs.count] = from, runs.end[runs.count] = to;
+        if (++runs.count == Runs::kRoom) look_through(begin, end, work);
       });
+    look_through(begin, end, work);
   }
 
-  RINGLET_KERNEL Mask<F> overlaps(const float* own, std::int32_t j) const {
-    return (component(kLow, j) <= F(own[kHigh])) & (F(own[kLow]) <= component(kHigh, j)) &
-           (component(kLow + 1, j) <= F(own[kHigh + 1])) & (F(own[kLow + 1]) <= component(kHigh + 1, j)) &
-           (component(kLow + 2, j) <= F(own[kHigh + 2])) & (F(own[kLow + 2]) <= component(kHigh + 2, j));
+  RINGLET_FUNCTION void look_through(std::int32_t begin, std::int32_t end, Work& work) const {
+    for (std::int32_t i = begin; i < end; ++i) {
+      const Box box = box_at(i);
+      for (int run = 0; run < work.runs.count; ++run) {
+        std::int32_t from = work.runs.begin[run];
+        const std::int32_t to = work.runs.end[run];
+        if (from <= i && i < to) from = i + 1;
+        for (std::int32_t j = from & ~(kBoxes - 1); j < to; j += kBoxes) {
+          std::uint32_t near = lane_bits(overlaps(box, j));
+          if (near == 0) continue;
+          if (j < from) near &= ~0u << (from - j);
+          if (to - j < kBoxes) near &= ~(~0u << (to - j));
+          for (; near; near &= near - 1) hit(i, j + __builtin_ctz(near), work);
+        }
+      }
+      sift(i, work);
+    }
+    work.runs.count = 0;
   }
 
-  // Not where the lines are on the same sides as before and farther apart than is near; nor where an axis
-  // separates the segments in the same order at both times, and so throughout.
-  RINGLET_KERNEL Mask<F> may_meet(const Segment<F>& start, const Segment<F>& end, std::int32_t j) const {
-    const Segment<F> other_start = segments(kStartBegin, kStartAlong, j),
-                     other_end = segments(kEndBegin, kEndAlong, j);
-    const Mask<F> possible = on_other_side_or_near(start, end, other_start, other_end, F(box_margin));
-    if (!some(possible)) return possible;
-    return possible & !stay_apart(&Vector3<F>::x, start, end, other_start, other_end) &
-           !stay_apart(&Vector3<F>::y, start, end, other_start, other_end) &
-           !stay_apart(&Vector3<F>::z, start, end, other_start, other_end);
+  RINGLET_KERNEL Box box_at(std::int32_t i) const {
+    Box box;
+    for (int c = 0; c < 3; ++c)
+      box.low[c] = table.corners[BoxTable::at(c, i)], box.high[c] = table.corners[BoxTable::at(3 + c, i)];
+    return box;
   }
 
-  template <class P>
-  RINGLET_KERNEL static Mask<P> on_other_side_or_near(const Segment<P>& a_start, const Segment<P>& a,
-                                                      const Segment<P>& b_start, const Segment<P>& b,
-                                                      P near) {
-    const P first = tetrahedron_volume(a_start, b_start), last = tetrahedron_volume(a, b);
-    const Vector3<P> across = cross(a.along(), b.along());
-    return differ_in_sign(first, last) | !(near * near * dot(across, across) < last * last);
+  RINGLET_KERNEL Mask<F> overlaps(const Box& box, std::int32_t j) const {
+    return (corner(0, j) <= F(box.high[0])) & (F(box.low[0]) <= corner(3, j)) &
+           (corner(1, j) <= F(box.high[1])) & (F(box.low[1]) <= corner(4, j)) &
+           (corner(2, j) <= F(box.high[2])) & (F(box.low[2]) <= corner(5, j));
   }
 
-  RINGLET_KERNEL Mask<F> stay_apart(F Vector3<F>::*axis, const Segment<F>& a_start, const Segment<F>& a,
-                                    const Segment<F>& b_start, const Segment<F>& b) const {
-    const F margin(box_margin);
-    const auto low = [&](const Segment<F>& s) { return min(s.begin.*axis, s.end.*axis); };
-    const auto high = [&](const Segment<F>& s) { return max(s.begin.*axis, s.end.*axis); };
-    const Mask<F> above = (low(b) - high(a) > margin) & (low(b_start) - high(a_start) > margin);
-    const Mask<F> below = (low(a) - high(b) > margin) & (low(a_start) - high(b_start) > margin);
-    return above | below;
+  RINGLET_KERNEL void hit(std::int32_t i, std::int32_t j, Work& work) const {
+    Hits& hits = work.hits;
+    const std::int32_t segment = table.piece[j].segment;
+    if (places.strand[segment] == places.strand[table.piece[i].segment]) return;
+    hits.segment[hits.count] = segment, hits.piece[hits.count] = j;
+    if (++hits.count == Hits::kRoom) sift(i, work);
   }
 
-  RINGLET_KERNEL void suspect(std::int32_t i, std::int32_t j, Work& work) const {
-    if (table.strand[i] == table.strand[j]) return;
+  // Leaves those hits of a piece that may be pairs, and forgets them: where the lines of the segments have
+  // changed sides, or are near at the end.
+  RINGLET_FUNCTION void sift(std::int32_t i, Work& work) const {
+    Hits& hits = work.hits;
+    const int count = hits.count;
+    hits.count = 0, hits.total += count;
+    if (count == 0) return;
+    const std::int32_t own = table.piece[i].segment;
+    const Segment<R> start = segment_at<R>(places.start, own), end = segment_at<R>(places.end, own);
+    const R radius(thickest(places.end, own));
+    for (int k = count; k % kPairs; ++k) hits.segment[k] = hits.segment[0], hits.piece[k] = hits.piece[0];
+    for (int k = 0; k < count; k += kPairs) {
+      const Segment<R> other_start = gather_segment<R>(places.start, hits.segment + k).places;
+      const Mask<R> possible = may_meet(start, other_start, i, hits.piece + k);
+      if (!some(possible)) continue;
+      const GatheredSegment<R> other = gather_segment<R>(places.end, hits.segment + k);
+      const R near = R(T(kNear)) * (radius + max(other.begin_extra, other.end_extra));
+      std::uint32_t left =
+          lane_bits(possible & on_other_side_or_near(start, end, other_start, other.places, near));
+      if (count - k < kPairs) left &= ~(~0u << (count - k));
+      for (; left; left &= left - 1) {
+        const int at = k + __builtin_ctz(left);
+        suspect(own, hits.segment[at], i, hits.piece[at], work);
+      }
+    }
+  }
+
+  RINGLET_KERNEL Mask<R> on_other_side_or_near(const Segment<R>& a_start, const Segment<R>& a,
+                                               const Segment<R>& b_start, const Segment<R>& b, R near) const {
+    const R first = tetrahedron_volume(a_start, b_start), last = tetrahedron_volume(a, b);
+    const Vector3<R> u = a.along(), w = b.along(), across = cross(u, w);
+    // Of lines that are nearly parallel the volume tells little more than its rounding.
+    const R sine2 = fma(parallel_sine2<R>() * dot(u, u), dot(w, w), dot(across, across));
+    return differ_in_sign(first, last) | (last * last <= near * near * sine2);
+  }
+
+  // Whether the lines at the start are so near that they can have met, on the pieces, before either had gone
+  // as far as it is looked for.
+  RINGLET_KERNEL Mask<R> may_meet(const Segment<R>& a, const Segment<R>& b, std::int32_t i,
+                                  const std::int32_t* pieces) const {
+    const LineProducts<R> lines(a.along(), b.along(), b.begin - a.begin);
+    const R sine2 = fma(parallel_sine2<R>() * lines.uu, lines.ww, lines.determinant);
+    const PieceRange own(table.piece[i]);
+    alignas(64) T middle[kPairs], half[kPairs], stray[kPairs];
+    for (int lane = 0; lane < kPairs; ++lane) {
+      const PieceRange range(table.piece[pieces[lane]]);
+      middle[lane] = range.middle, half[lane] = range.half;
+      stray[lane] = T(carried[table.piece[pieces[lane]].segment].extra);
+    }
+    const R most = R(far + T(carried[table.piece[i].segment].extra)) + load<R>(stray),
+            volume = tetrahedron_volume(a, b);
+    // Places shift by the distance over the sine of the angle.
+    const R per_sine = most * inverse_or_zero(sqrt(lines.determinant), R(T(1e-18)));
+    const Mask<R> on_a = abs(lines.s() - R(own.middle)) <= fma(per_sine, sqrt(lines.ww), R(own.half)),
+                  on_b = abs(lines.u() - load<R>(middle)) <= fma(per_sine, sqrt(lines.uu), load<R>(half));
+    const Mask<R> parallel = lines.determinant <= R(T(1e-4)) * lines.uu * lines.ww;
+    return (volume * volume <= most * most * sine2) & (parallel | (on_a & on_b));
+  }
+
+  RINGLET_KERNEL void suspect(std::int32_t a, std::int32_t b, std::int32_t i, std::int32_t j,
+                              Work& work) const {
     Suspects& suspects = work.suspects;
-    suspects.a[suspects.count] = table.segment[i], suspects.b[suspects.count] = table.segment[j];
+    suspects.a[suspects.count] = a, suspects.b[suspects.count] = b;
+    suspects.a_piece[suspects.count] = i, suspects.b_piece[suspects.count] = j;
     if (++suspects.count == Suspects::kRoom) look_at(work);
   }
 
-  // Chooses among the suspects, and forgets them.
+  // Chooses among the suspects, and forgets them. A pair counts for the two pieces that the contact is on.
   RINGLET_FUNCTION void look_at(Work& work) const {
     Suspects& suspects = work.suspects;
     const int count = suspects.count;
@@ -188,50 +231,35 @@ struct PairSearch {
     for (int k = count; k % kPairs; ++k) suspects.a[k] = suspects.a[0], suspects.b[k] = suspects.b[0];
     for (int k = 0; k < count; k += kPairs) {
       const std::int32_t *a = suspects.a + k, *b = suspects.b + k;
-      const SegmentPair<R> pair = gather_pair<R>(places, a, b);
-      const PairContact<R> contact = find_contact(pair, R(reach));
-      std::uint32_t found = lane_bits(contact.crossed | (contact.distance < R(reach + margin)));
+      const PackOfPairs<R> gathered(places, a, b);
+      const SegmentPair<R> pair = gathered.places();
+      const R reach = gathered.largest_reach();
+      const PairContact<R> contact = find_contact(pair, reach, R(0));
+      std::uint32_t found = lane_bits(contact.crossed | (contact.distance < R(T(kNear)) * reach));
       if (count - k < kPairs) found &= ~(~0u << (count - k));
       if (found == 0) continue;
-      alignas(64) T key[kPairs], beyond[kPairs];  // the latter in segment lengths
-      const R shorter = min(length(pair.a.along()), length(pair.b.along()));
+      alignas(64) T key[kPairs], on_a[kPairs], on_b[kPairs];
       store(key, select(contact.crossed, -contact.later, contact.distance));
-      store(beyond, select(contact.crossed, -contact.distance, R(0)) * inverse_or_zero(shorter, R(T(1e-9))));
+      store(on_a, contact.s), store(on_b, contact.u);
       for (; found; found &= found - 1) {
         const int lane = __builtin_ctz(found);
-        if (work.chosen.a != a[lane]) write(work), work.chosen.a = a[lane];
-        work.chosen.offer(b[lane], key[lane], beyond[lane]);
+        const std::int32_t i = suspects.a_piece[k + lane];
+        if (!table.piece[i].holds(on_a[lane]) || !table.piece[suspects.b_piece[k + lane]].holds(on_b[lane]))
+          continue;
+        if (work.chosen.piece != i) write(work), work.chosen.piece = i, work.chosen.a = a[lane];
+        work.chosen.offer(b[lane], key[lane]);
+        const std::int32_t met = key[lane] < T(0) ? 1 + kCrossing : 1;
+        atomic_add(&meetings[a[lane]], met), atomic_add(&meetings[b[lane]], met);
       }
     }
   }
 
-  // Writes what was chosen for a segment.
+  // Writes what was chosen for a piece.
   RINGLET_FUNCTION void write(Work& work) const {
     Chosen& chosen = work.chosen;
-    for (std::int32_t k = 0; k < chosen.count; ++k) {
-      work.writer.add({chosen.a, chosen.b[k], k});
-      if (chosen.beyond[k] > T(kFar)) add_around({chosen.a, chosen.b[k], k}, chosen.beyond[k], work.writer);
-    }
+    for (std::int32_t k = 0; k < chosen.count; ++k)
+      work.writer.add({chosen.a, chosen.b[k], chosen.key[k] < T(0) ? k : k + kNearRank});
     chosen.count = 0;
-  }
-
-  // What went past another by more than this share of its length may come to meet it with another segment
-  // when it is put back: the next, or one farther on.
-  static constexpr double kFar = 0.25;
-  static constexpr std::int32_t kMostAround = 4, kAroundLater = 8;
-
-  RINGLET_FUNCTION void add_around(const RankedPair& pair, T beyond, PairWriter& writer) const {
-    const std::int32_t around = 1 + static_cast<std::int32_t>(min(T(kFar) * beyond, T(kMostAround - 1)));
-    for (std::int32_t i = -around * kLanes; i <= around * kLanes; i += kLanes)
-      for (std::int32_t j = -around * kLanes; j <= around * kLanes; j += kLanes) {
-        const std::int32_t one = pair.a + i, other = pair.b + j;
-        if ((i == 0 && j == 0) || !same_strand(pair.a, one) || !same_strand(pair.b, other)) continue;
-        const bool first = comes_first(places.end, one, other);
-        writer.add({first ? one : other, first ? other : one, pair.rank});
-      }
-  }
-  RINGLET_KERNEL bool same_strand(std::int32_t segment, std::int32_t other) const {
-    return other >= 0 && other < particles && strand[other] == strand[segment];
   }
 };
 

@@ -137,6 +137,11 @@ RINGLET_KERNEL R parallel_sine2() {
 }
 
 template <class R>
+RINGLET_KERNEL Mask<R> within_unit(R at) {
+  return (R(0) - joint_tolerance<R>() < at) & (at < R(1) + joint_tolerance<R>());
+}
+
+template <class R>
 RINGLET_KERNEL Segment<R> between(const Segment<R>& start, const Segment<R>& end, R t) {
   return {fma(t, end.begin - start.begin, start.begin), fma(t, end.end - start.end, start.end)};
 }
@@ -156,9 +161,8 @@ RINGLET_KERNEL PairContact<R> crossing_contact(const SegmentPair<R>& pair, R vol
   const R t = crossing_time(pair);
   const Segment<R> a = between(pair.a_start, pair.a, t), b = between(pair.b_start, pair.b, t);
   const LineProducts<R> products(a.along(), b.along(), b.begin - a.begin);
-  const R s = products.s(), u = products.u(), least = R(0) - joint_tolerance<R>(),
-          most = R(1) + joint_tolerance<R>();
-  contact.crossed = (s > least) & (s < most) & (u > least) & (u < most);
+  const R s = products.s(), u = products.u();
+  contact.crossed = within_unit(s) & within_unit(u);
   contact.s = clamp_unit(s), contact.u = clamp_unit(u);
   contact.later = R(1) - t;
   const Vector3<R> across = cross(a.along(), b.along());
@@ -193,10 +197,28 @@ RINGLET_KERNEL PairContact<R> parallel_contact(const SegmentPair<R>& pair, const
   return contact;
 }
 
-// `reach`: sum of the radii [m].
+// The contact of a pair whose side is known from before: through one another as they now lie, or not.
 template <class R>
-RINGLET_FUNCTION PairContact<R> find_contact(const SegmentPair<R>& pair, R reach) {
-  const R first = tetrahedron_volume(pair.a_start, pair.b_start), last = tetrahedron_volume(pair.a, pair.b);
+RINGLET_KERNEL PairContact<R> standing_contact(const SegmentPair<R>& pair, const LineProducts<R>& products,
+                                               R side) {
+  PairContact<R> contact;
+  const R s = products.s(), u = products.u();
+  contact.crossed = within_unit(s) & within_unit(u);
+  contact.s = clamp_unit(s), contact.u = clamp_unit(u);
+  contact.later = R(1);
+  const R scale = inverse_or_zero(sqrt(products.determinant), R(Scalar<R>(1e-18)));
+  contact.normal = select(side < R(0), scale, R(0) - scale) * cross(pair.a.along(), pair.b.along());
+  contact.distance = dot(contact.normal, pair.a.at(contact.s) - pair.b.at(contact.u));
+  return contact;
+}
+
+// `reach`: sum of the radii [m]. `side`: the sign of V when the segments last were on their own sides, where
+// that was before the start; 0 where they were so at the start.
+template <class R>
+RINGLET_FUNCTION PairContact<R> find_contact(const SegmentPair<R>& pair, R reach, R side) {
+  const Mask<R> standing = (side < R(0)) | (side > R(0));
+  const R first = select(standing, side, tetrahedron_volume(pair.a_start, pair.b_start)),
+          last = tetrahedron_volume(pair.a, pair.b);
   const LineProducts<R> products(pair.a.along(), pair.b.along(), pair.b.begin - pair.a.begin);
   const Mask<R> parallel = products.determinant <= parallel_sine2<R>() * (products.uu * products.ww);
 
@@ -214,11 +236,14 @@ RINGLET_FUNCTION PairContact<R> find_contact(const SegmentPair<R>& pair, R reach
       select(inside, select(first < R(0), per_sine, -per_sine) * cross(pair.a.along(), pair.b.along()),
              inverse_or_zero(contact.distance, R(Scalar<R>(1e-12))) * apart);
 
-  if (some(changed & !parallel)) {
-    const PairContact<R> crossing = crossing_contact(pair, first);
-    contact.crossed = crossing.crossed & changed & !parallel;
-    set_contact(contact.crossed, crossing, contact);
-  }
+  const auto take = [&](Mask<R> where, const PairContact<R>& crossing) {
+    const Mask<R> crossed = crossing.crossed & where;
+    contact.crossed = contact.crossed | crossed;
+    set_contact(crossed, crossing, contact);
+  };
+  const Mask<R> turned = changed & !parallel;
+  if (some(turned & !standing)) take(turned & !standing, crossing_contact(pair, first));
+  if (some(turned & standing)) take(turned & standing, standing_contact(pair, products, first));
   if (some(parallel)) {
     const PairContact<R> beside = parallel_contact(pair, products, reach);
     contact.crossed = contact.crossed | (beside.crossed & parallel);

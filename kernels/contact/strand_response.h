@@ -34,19 +34,16 @@ template <class T>
 struct ContactStrands {
   ContactPairs<T> pairs;
   ContactLists lists;
-  const std::int32_t* row;  // [batches + 1]
-  const T* count;           // [batches][kLanes]
-  const Place<T>* start;    // extra: freedom
+  const std::int32_t* first_particle;  // [strands + 1]
+  const Place<T>* start;               // extra: freedom
   Place<T>*end, *velocity;
   ParticleLoad* load;  // [particles]
   double* kappa;       // [strands], negative where nothing touches
   std::int32_t clamped;
 
-  RINGLET_KERNEL std::int32_t first(std::int32_t strand) const {
-    return row[strand / kLanes] * kLanes + strand % kLanes;
-  }
+  RINGLET_KERNEL std::int32_t first(std::int32_t strand) const { return first_particle[strand]; }
   RINGLET_KERNEL std::int32_t particles(std::int32_t strand) const {
-    return static_cast<std::int32_t>(count[strand]);
+    return first_particle[strand + 1] - first_particle[strand];
   }
 
   // Calls visit(pair's record, whether the segment is its b).
@@ -65,7 +62,7 @@ struct ContactStrands {
     ParticleLoad* at = load + first(strand);
     double carry = 0;
     for (std::int32_t i = 0; i < n; ++i) {
-      ParticleLoad& here = at[i * kLanes];
+      ParticleLoad& here = at[i];
       if (i < clamped) {
         for (int k = begin; k < finish; ++k) here.value[k] = 0;
         here.carry = 0;
@@ -74,14 +71,13 @@ struct ContactStrands {
       const double links = (i > 0 ? 1 : 0) + (i + 1 < n ? 1 : 0);
       const double inverse = 1 / (1 + kappa_here * (links - carry));
       for (int k = begin; k < finish; ++k) {
-        const double before = i > 0 ? at[(i - 1) * kLanes].value[k] : 0;
+        const double before = i > 0 ? at[i - 1].value[k] : 0;
         here.value[k] = (here.value[k] + kappa_here * before) * inverse;
       }
       carry = here.carry = kappa_here * inverse;
     }
     for (std::int32_t i = n - 2; i >= clamped; --i)
-      for (int k = begin; k < finish; ++k)
-        at[i * kLanes].value[k] += at[i * kLanes].carry * at[(i + 1) * kLanes].value[k];
+      for (int k = begin; k < finish; ++k) at[i].value[k] += at[i].carry * at[i + 1].value[k];
   }
 };
 
@@ -96,7 +92,7 @@ struct FindResponse {
     double depth = 0, length = 0;
     bool touched = false;
     double carried = 0;
-    for (std::int32_t i = 0, p = first; i < n; ++i, p += kLanes) {
+    for (std::int32_t i = 0, p = first; i < n; ++i, ++p) {
       double here = carried;
       carried = 0;
       if (i + 1 < n) {
@@ -105,7 +101,7 @@ struct FindResponse {
           here += 1 - share, carried += share, touched = true;
           depth = -record.gap > depth ? -record.gap : depth;
         });
-        length += kernels::length(vector(strands.start[p + kLanes]) - vector(strands.start[p]));
+        length += kernels::length(vector_of(strands.start[p + 1]) - vector_of(strands.start[p]));
       }
       strands.load[p].value[0] = here;
     }
@@ -115,12 +111,9 @@ struct FindResponse {
     const double kappa = reach * reach;
     strands.kappa[strand] = kappa;
     strands.respond(strand, kappa, 0, 1);
-    for (std::int32_t i = 0, p = first; i < n; ++i, p += kLanes)
+    for (std::int32_t i = 0, p = first; i < n; ++i, ++p)
       strands.velocity[p].extra = static_cast<T>(strands.load[p].value[0]);
   }
-
- private:
-  RINGLET_KERNEL static Vector3<T> vector(const Place<T>& place) { return {place.x, place.y, place.z}; }
 };
 
 template <class T>
@@ -131,8 +124,8 @@ struct ApplyContacts {
     if (strands.kappa[strand] < 0) return;
     const std::int32_t n = strands.particles(strand), first = strands.first(strand);
     for (int k = 0; k < kLoads; ++k) strands.load[first].value[k] = 0;
-    for (std::int32_t i = 0, p = first; i + 1 < n; ++i, p += kLanes) {
-      ParticleLoad &begin = strands.load[p], &finish = strands.load[p + kLanes];
+    for (std::int32_t i = 0, p = first; i + 1 < n; ++i, ++p) {
+      ParticleLoad &begin = strands.load[p], &finish = strands.load[p + 1];
       for (int k = 0; k < kLoads; ++k) finish.value[k] = 0;
       strands.for_contacts(p, [&](const ContactRecord<T>& record, bool second) {
         const double share = second ? record.u : record.s, sign = second ? -1 : 1;
@@ -143,7 +136,7 @@ struct ApplyContacts {
       });
     }
     strands.respond(strand, strands.kappa[strand], 1, kLoads);
-    for (std::int32_t i = strands.clamped, p = first + i * kLanes; i < n; ++i, p += kLanes) {
+    for (std::int32_t i = strands.clamped, p = first + i; i < n; ++i, ++p) {
       move(strands.end[p], strands.load[p].value + 1), move(strands.velocity[p], strands.load[p].value + 4);
     }
   }

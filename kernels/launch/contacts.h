@@ -1,30 +1,15 @@
-// The contacts of hair against hair as the program calls them: one table of functions for each instruction
-// set.
+// Makes the contacts of hair against hair for an instruction set.
 #pragma once
-#include <cstddef>
+#include <memory>
 
 #include "kernels/backend/host.h"
-#include "kernels/contact/contact_step.h"
+#include "kernels/contact/hair_contacts.h"
 #include "kernels/launch/launch.h"
 
 namespace ringlet::kernels {
 
-// The memory that an application works in, kept from one to the next.
-struct HairContactMemory;
-
+// For T = float or double, on the CPU.
 template <class T>
-struct HairContactTable {
-  HairContactMemory* (*make)(HostThreads threads);
-  void (*destroy)(HairContactMemory* memory);
-  std::size_t (*bytes)(const HairContactMemory* memory);
-  // Finds what the passes look at; returns how many pairs that is.
-  HairContactFigures (*begin)(HairContactMemory* memory, const HairContactStep<T>& step);
-  // One pass over the state as it now is. The figures tell what it found.
-  void (*pass)(HairContactMemory* memory, const HairContactStep<T>& step, HairContactFigures& figures);
-};
-
-// The table for T = float or double.
-template <class T>
-const HairContactTable<T>& cpu_hair_contacts(InstructionSet set);
+std::unique_ptr<HairContacts<T>> make_hair_contacts(InstructionSet set, HostThreads threads);
 
 }  // namespace ringlet::kernels

@@ -34,12 +34,6 @@ const char* name_of(InstructionSet set) {
   return "generic";
 }
 
-InstructionSet instruction_set_named(const char* name) {
-  for (const InstructionSet set : {InstructionSet::kGeneric, InstructionSet::kAvx2, InstructionSet::kAvx512})
-    if (__builtin_strcmp(name, name_of(set)) == 0) return set;
-  return best_instruction_set();
-}
-
 template <>
 const KernelTable<float>& cpu_kernels<float>(InstructionSet set) {
   if (set == InstructionSet::kAvx512) return avx512::float_kernels;

@@ -2,25 +2,35 @@
 
 namespace ringlet::kernels {
 
-#define RINGLET_DECLARE(isa)                                  \
-  namespace isa {                                             \
-  extern const HairContactTable<float> float_hair_contacts;   \
-  extern const HairContactTable<double> double_hair_contacts; \
+#define RINGLET_DECLARE(isa)                                      \
+  namespace isa {                                                 \
+  HairContacts<float>* new_float_contacts(HostThreads threads);   \
+  HairContacts<double>* new_double_contacts(HostThreads threads); \
   }
 RINGLET_DECLARE(generic)
 RINGLET_DECLARE(avx2)
 RINGLET_DECLARE(avx512)
 #undef RINGLET_DECLARE
 
+// Here and not in the class: it must not be compiled for an instruction set.
+template <class T>
+HairContacts<T>::~HairContacts() = default;
+template class HairContacts<float>;
+template class HairContacts<double>;
+
 template <>
-const HairContactTable<float>& cpu_hair_contacts<float>(InstructionSet set) {
-  if (set == InstructionSet::kAvx512) return avx512::float_hair_contacts;
-  return set == InstructionSet::kAvx2 ? avx2::float_hair_contacts : generic::float_hair_contacts;
+std::unique_ptr<HairContacts<float>> make_hair_contacts(InstructionSet set, HostThreads threads) {
+  const auto make = set == InstructionSet::kAvx512 ? avx512::new_float_contacts
+                    : set == InstructionSet::kAvx2 ? avx2::new_float_contacts
+                                                   : generic::new_float_contacts;
+  return std::unique_ptr<HairContacts<float>>(make(threads));
 }
 template <>
-const HairContactTable<double>& cpu_hair_contacts<double>(InstructionSet set) {
-  if (set == InstructionSet::kAvx512) return avx512::double_hair_contacts;
-  return set == InstructionSet::kAvx2 ? avx2::double_hair_contacts : generic::double_hair_contacts;
+std::unique_ptr<HairContacts<double>> make_hair_contacts(InstructionSet set, HostThreads threads) {
+  const auto make = set == InstructionSet::kAvx512 ? avx512::new_double_contacts
+                    : set == InstructionSet::kAvx2 ? avx2::new_double_contacts
+                                                   : generic::new_double_contacts;
+  return std::unique_ptr<HairContacts<double>>(make(threads));
 }
 
 }  // namespace ringlet::kernels

@@ -31,8 +31,6 @@ inline std::int64_t scratch_reals(int particles) {
 // The widest set that this processor has.
 InstructionSet best_instruction_set();
 const char* name_of(InstructionSet set);
-// The set of that name, the widest this processor has for any other (a device's).
-InstructionSet instruction_set_named(const char* name);
 
 // The table for T = float or double.
 template <class T>

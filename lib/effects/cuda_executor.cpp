@@ -2,6 +2,8 @@
 
 #include "core/error.h"
 #include "effects/executor.h"
+#include "effects/host_threads.h"
+#include "kernels/launch/contacts.h"
 #include "kernels/launch/cuda_kernels.h"
 #include "kernels/solid/response.h"
 
@@ -109,6 +111,9 @@ class CudaExecutor : public Executor<float> {
   }
   std::unique_ptr<kernels::HairGrid<float>> make_hair_grid() override {
     return std::make_unique<DeviceGrid>(*strands_);
+  }
+  std::unique_ptr<kernels::HairContacts<float>> make_hair_contacts() override {
+    return kernels::make_hair_contacts<float>(kernels::best_instruction_set(), host_threads());
   }
 
  private:

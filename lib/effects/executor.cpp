@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "effects/host_threads.h"
+#include "kernels/launch/contacts.h"
 #include "kernels/launch/hair_grid.h"
 #include "kernels/launch/launch.h"
 
@@ -45,6 +46,9 @@ class CpuExecutor : public Executor<T> {
   void length_step(const kernels::LengthStep<T>& step) override { run(kernels_.length_step, step); }
   std::unique_ptr<kernels::HairGrid<T>> make_hair_grid() override {
     return kernels::make_hair_grid<T>(set_, host_threads());
+  }
+  std::unique_ptr<kernels::HairContacts<T>> make_hair_contacts() override {
+    return kernels::make_hair_contacts<T>(set_, host_threads());
   }
 
  private:

@@ -17,6 +17,8 @@ template <class T>
 struct LengthStep;
 template <class T>
 class HairGrid;
+template <class T>
+class HairContacts;
 }  // namespace ringlet::kernels
 
 namespace ringlet::effects {
@@ -42,6 +44,8 @@ class Executor {
   virtual void length_step(const kernels::LengthStep<T>& step) = 0;
   // The grid of hair against hair, on the strands where they are. To be used only while the executor lives.
   virtual std::unique_ptr<kernels::HairGrid<T>> make_hair_grid() = 0;
+  // The contacts of hair against hair, on the host's copy of the strands: `fetch` before, `submit` after.
+  virtual std::unique_ptr<kernels::HairContacts<T>> make_hair_contacts() = 0;
 };
 
 // `instruction_set`: avx512, avx2 or generic; empty: the widest this processor has. Throws Error{kUsage} for

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "effects/executor.h"
+#include "state/frame.h"
 #include "state/strand_model.h"
 
 namespace ringlet::effects {
@@ -61,6 +62,10 @@ class Stage {
   // Before anything of the substep has moved, the roots neither. At a frame's start the host has the state.
   virtual void begin(Executor<T>&, const Substep&) {}
   virtual void run(Executor<T>& executor, const Substep& substep, FrameReport& report) = 0;
+  // What it keeps from one frame to the next beside the state, into and out of a checkpoint: at a frame's
+  // end, when the host has the state; after `at_rest`.
+  virtual void save(state::Snapshot&) {}
+  virtual void restore(const state::Snapshot&) {}
   // The first strand that diverged in the last `run`, -1 for none.
   virtual std::int64_t diverged_strand() const { return -1; }
 };

@@ -316,6 +316,7 @@ void TypedSimulation<T>::resume(const state::Snapshot& snapshot) {
   for (std::size_t s = 0; s < now_.size(); ++s) set_root_motion(state_, model_.layout, s, now_[s], now_[s]);
   if (grooming_) renew_executor();
   tell_rest();
+  for (const auto& stage : stages_) stage->restore(snapshot);
   executor_->submit(state_);
 }
 
@@ -344,7 +345,9 @@ bool TypedSimulation<T>::run(const FrameRange& range, state::FrameSink& sink, co
   const auto hand_on = [&](state::Frame out, double spent) {
     const state::Figures solver = figures_of(report, strand_steps, scene_.effects.hair_hair);
     out.figures.insert(out.figures.begin(), solver.begin(), solver.end());
-    sink.write(std::move(out), save(frame, model_, state_, grooming_.has_value()), spent);
+    state::Snapshot snapshot = save(frame, model_, state_, grooming_.has_value());
+    for (const auto& stage : stages_) stage->save(snapshot);
+    sink.write(std::move(out), std::move(snapshot), spent);
   };
   // Counted where the plan has such a stage.
   const auto timed = [&](const char* name, const auto& work) {

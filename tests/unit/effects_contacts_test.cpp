@@ -39,7 +39,10 @@ class ContactsStage : public testing::Test {
     report_.strain.assign(2, 0), report_.moved.assign(2, 0);
   }
 
-  void make() { stage_ = make_contacts_stage<T>(scene_, *model_, *state_, *executor_); }
+  void make() {
+    stage_ = make_contacts_stage<T>(scene_, *model_, *state_, *executor_);
+    stage_->at_rest(*executor_, *state_);
+  }
   Substep substep(int k) const { return {2, k * kStep, (k + 1) * kStep, kStep, k == 0, k == 7}; }
 
   // The upper strand's particles but its root go down by `by` [m], at the speed of that way.

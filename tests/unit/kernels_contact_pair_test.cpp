@@ -28,7 +28,7 @@ SegmentPair<T> as_pair(const Motion& motion) {
 }
 template <class T>
 PairContact<T> contact_of(const Motion& motion, double reach = 0) {
-  return kernels::find_contact(as_pair<T>(motion), static_cast<T>(reach));
+  return kernels::find_contact(as_pair<T>(motion), static_cast<T>(reach), T(0));
 }
 template <class T>
 Vec3 normal_of(const PairContact<T>& contact) {

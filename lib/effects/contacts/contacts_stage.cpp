@@ -1,54 +1,32 @@
 #include "effects/contacts/contacts_stage.h"
 
 #include <algorithm>
+#include <cstring>
 
-#include "effects/host_threads.h"
 #include "effects/lengths.h"
-#include "kernels/launch/contacts.h"
+#include "kernels/contact/hair_contacts.h"
+#include "state/strand_order.h"
 
 namespace ringlet::effects {
 namespace {
-
-// The kernels' memory.
-template <class T>
-class Contacts {
- public:
-  explicit Contacts(kernels::InstructionSet set)
-      : table_(kernels::cpu_hair_contacts<T>(set)), memory_(table_.make(host_threads())) {}
-  ~Contacts() { table_.destroy(memory_); }
-  Contacts(const Contacts&) = delete;
-  Contacts& operator=(const Contacts&) = delete;
-
-  kernels::HairContactFigures begin(const kernels::HairContactStep<T>& step) {
-    return table_.begin(memory_, step);
-  }
-  void pass(const kernels::HairContactStep<T>& step, kernels::HairContactFigures& figures) {
-    table_.pass(memory_, step, figures);
-  }
-  std::size_t bytes() const { return table_.bytes(memory_); }
-
- private:
-  const kernels::HairContactTable<T>& table_;
-  kernels::HairContactMemory* memory_;
-};
 
 template <class T>
 class ContactsStage : public Stage<T> {
  public:
   ContactsStage(const scene::Scene& scene, const state::StrandModel<T>& model, state::StrandState<T>& state,
-                const Executor<T>& executor)
+                Executor<T>& executor)
       : scene_(scene),
         options_(*scene.effects.hair_hair->contacts),
         model_(model),
         state_(state),
-        contacts_(kernels::instruction_set_named(executor.instruction_set().c_str())),
+        contacts_(executor.make_hair_contacts()),
         start_(state.position.size()),
         start_root_points_(state.root_points.size()),
         lengths_(scene, model, state) {}
 
   std::string name() const override { return "contacts"; }
   std::size_t bytes() const override {
-    return contacts_.bytes() + lengths_.bytes() + start_.size() * sizeof(T) +
+    return contacts_->bytes() + lengths_.bytes() + start_.size() * sizeof(T) +
            start_root_points_.size() * sizeof(double);
   }
   // Of the device, which only holds the lengths.
@@ -59,18 +37,22 @@ class ContactsStage : public Stage<T> {
   std::int64_t diverged_strand() const override { return lengths_.diverged_strand(); }
 
   // Takes the memory that hair at rest asks for.
-  void at_rest(Executor<T>&, const state::StrandState<T>& rest) override {
+  void at_rest(Executor<T>& executor, const state::StrandState<T>& rest) override {
+    contacts_ = executor.make_hair_contacts();  // the executor may be another than before
+    order_ = state::strands_by_root(model_, rest);
     start_ = rest.position, start_root_points_ = rest.root_points;
     kernels::HairContactStep<T> step = contact_step();
     step.state = {start_.data(), start_.data()};  // not changed, and velocities do not matter
     step.root_points = start_root_points_.data();
-    contacts_.begin(step);
+    contacts_->begin(step);
+    contacts_->keep(nullptr, 0);  // nothing is through anything
   }
 
   // Contacts are found over all the way since here: since the frame began, or the substep.
   void begin(Executor<T>& executor, const Substep& substep) override {
     if (!substep.first_of_frame && !each_substep()) return;
     if (!substep.first_of_frame) executor.fetch(state_);  // at the frame's start the host has the state
+    contacts_->settle(contact_step());
     std::copy(state_.position.begin(), state_.position.end(), start_.begin());
     std::copy(state_.root_points.begin(), state_.root_points.end(), start_root_points_.begin());
   }
@@ -79,28 +61,52 @@ class ContactsStage : public Stage<T> {
     if (!substep.last_of_frame && !each_substep()) return;
     executor.fetch(state_);
     const kernels::HairContactStep<T> step = contact_step();
-    kernels::HairContactFigures found = contacts_.begin(step);
-    report.contact_pairs += static_cast<double>(found.pairs);
+    kernels::HairContactFigures figures = contacts_->begin(step);
     const double seconds = substep.step * (each_substep() ? 1 : scene_.model.substeps);
+    std::int64_t contacts = 0;
     for (int pass = 0; pass < options_.passes; ++pass) {
-      if (pass > 0) executor.fetch(state_);
-      contacts_.pass(step, found);
-      if (pass == 0) report.contacts += static_cast<double>(found.contacts);
-      if (found.contacts == 0) break;
+      const std::int64_t found = contacts_->pass(step);
+      if (pass == 0) contacts = found;
+      if (found == 0) break;
       executor.submit(state_);
       lengths_.hold(executor, substep, seconds, report);
+      executor.fetch(state_);
     }
-    report.crossings += static_cast<double>(found.crossings);
-    report.contact_depth = std::max(report.contact_depth, found.depth);
+    if (contacts > 0) contacts_->count_crossings(step, figures);
+    report.contact_pairs += static_cast<double>(figures.pairs);
+    report.contacts += static_cast<double>(contacts);
+    report.crossings += static_cast<double>(figures.crossings);
+    report.contact_depth = std::max(report.contact_depth, figures.depth);
+  }
+
+  // What is through one another stays known.
+  void save(state::Snapshot& snapshot) override {
+    contacts_->settle(contact_step());
+    if (contacts_->kept() == 0) return;
+    std::vector<std::uint64_t> kept(contacts_->kept());
+    contacts_->copy_kept(kept.data());
+    std::vector<std::byte>& bytes = snapshot.arrays[kKept];
+    bytes.resize(kept.size() * sizeof kept[0]);
+    std::memcpy(bytes.data(), kept.data(), bytes.size());
+  }
+  void restore(const state::Snapshot& snapshot) override {
+    const auto found = snapshot.arrays.find(kKept);
+    if (found == snapshot.arrays.end()) return;
+    std::vector<std::uint64_t> kept(found->second.size() / sizeof(std::uint64_t));
+    std::memcpy(kept.data(), found->second.data(), kept.size() * sizeof kept[0]);
+    contacts_->keep(kept.data(), static_cast<std::int32_t>(kept.size()));
   }
 
  private:
+  static constexpr const char* kKept = "contacts";
+
   bool each_substep() const { return options_.cadence == scene::Cadence::kSubstep; }
 
   kernels::HairContactStep<T> contact_step() {
     kernels::HairContactStep<T> step{};
     step.batches = model_.view();
     step.row_count = static_cast<std::int32_t>(model_.layout.rows());
+    step.order = order_.data(), step.strands = static_cast<std::int32_t>(order_.size());
     step.state = state_.view();
     step.start = start_.data();
     step.start_root_points = start_root_points_.data();
@@ -115,7 +121,8 @@ class ContactsStage : public Stage<T> {
   const scene::HairContacts& options_;
   const state::StrandModel<T>& model_;
   state::StrandState<T>& state_;
-  Contacts<T> contacts_;
+  std::unique_ptr<kernels::HairContacts<T>> contacts_;
+  std::vector<std::int32_t> order_;  // of the strands
   state::AlignedVector<T> start_;
   state::AlignedVector<double> start_root_points_;
   Lengths<T> lengths_;

@@ -1,0 +1,248 @@
+// Hair against hair, segment by segment (physics.md section 5, the Lagrangian stage).
+//
+// Segments of different strands are in contact where they have passed through one another since the last
+// application, or are nearer than the sum of their radii (segment_pair.h); each pass finds contacts anew
+// among the pairs of neighbours and answers them (contact_response.h). What is through one another when an
+// application ends is answered in the next (standing_crossings.h). Segments of one strand do not collide with
+// one another. Prescribed particles are not moved: segments at the root are obstacles.
+#pragma once
+#include "kernels/contact/neighbours.h"
+#include "kernels/contact/standing_crossings.h"
+#include "kernels/contact/strand_response.h"
+
+namespace ringlet::kernels {
+inline namespace RINGLET_ISA {
+
+// F: the pack that boxes are compared by; R: the one that pairs are computed by, or scalars on a GPU.
+template <class Backend, class F, class R>
+class ContactSolver : public HairContacts<Scalar<R>> {
+ public:
+  using T = Scalar<R>;
+
+  explicit ContactSolver(typename Backend::Lent lent) : backend_(lent) {}
+
+  void settle(const HairContactStep<T>& step) override {
+    if (settled_) return;
+    settled_ = true;
+    standing_.clear();
+    if (pairs_.count == 0) return;
+    lay_out(step, kEndsOnly);
+    standing_.find(backend_, pairs_, places());
+    pairs_.count = 0;
+  }
+
+  HairContactFigures begin(const HairContactStep<T>& step) override {
+    settled_ = false;
+    HairContactFigures figures;
+    pairs_.count = 0;
+    number_particles(step);
+    lay_out(step, kAll);
+    const std::int32_t fresh = neighbours_.find(backend_, places(), standing_.count());
+    figures.pairs = fresh + standing_.count();
+    if (figures.pairs > 0) list_pairs(fresh);
+    return figures;
+  }
+
+  std::int64_t pass(const HairContactStep<T>& step) override {
+    if (pairs_.count == 0) return 0;
+    lay_out(step, kAll);
+    const std::int64_t contacts = find();
+    if (contacts == 0) return 0;
+    answer(step);
+    write_back(step);
+    return contacts;
+  }
+
+  void count_crossings(const HairContactStep<T>& step, HairContactFigures& figures) override {
+    if (pairs_.count == 0) return;
+    lay_out(step, kAll);
+    find();
+    const unsigned char* active = active_.data();
+    const ContactRecord<T>* record = record_.data();
+    figures.crossings = static_cast<std::int64_t>(backend_.sum(
+        "count crossings", pairs_.count,
+        [=] RINGLET_LAMBDA(std::int32_t k) { return active[k] == 2 && record[k].gap < T(0) ? 1.0 : 0.0; }));
+    figures.depth = backend_.largest("depth", pairs_.count, 0, [=] RINGLET_LAMBDA(std::int32_t k) {
+      return active[k] == 1 ? -static_cast<double>(record[k].gap) : 0.0;
+    });
+  }
+
+  std::int32_t kept() const override { return standing_.count(); }
+  void copy_kept(std::uint64_t* to) const override { standing_.copy_to(to); }
+  void keep(const std::uint64_t* kept, std::int32_t count) override {
+    standing_.copy_from(kept, count), settled_ = true;
+  }
+
+  std::size_t bytes() const override {
+    return backend_.bytes() + first_.bytes() + strand_.bytes() + start_.bytes() + end_.bytes() +
+           velocity_.bytes() + contacts_.bytes() + list_first_.bytes() + list_entry_.bytes() +
+           cursor_.bytes() + record_.bytes() + active_.bytes() + side_.bytes() + load_.bytes() +
+           kappa_.bytes() + neighbours_.bytes() + standing_.bytes();
+  }
+
+ private:
+  template <class V>
+  using Buffer = typename Backend::template Buffer<V>;
+  static constexpr int kWidth = Traits<R>::kWidth;
+  static constexpr int kPackChunk = 128, kStrandChunk = 64;
+  enum LaidOut { kEndsOnly, kAll };
+
+  HairPlaces<T> places() const { return {start_.data(), end_.data(), strand_.data(), particles_}; }
+  std::int32_t packs() const { return (pairs_.count + kWidth - 1) / kWidth; }
+
+  void number_particles(const HairContactStep<T>& step) {
+    first_.resize(step.strands + 1);
+    std::int32_t* first = first_.data();
+    const std::int32_t strands = step.strands;
+    backend_.parallel_for("count particles", strands + 1, [=] RINGLET_LAMBDA(std::int32_t s) {
+      first[s] = s < strands ? static_cast<std::int32_t>(step.batches.count[step.order[s]]) : 0;
+    });
+    particles_ = backend_.scan("number particles", first_, strands + 1);
+    strand_.resize(particles_);
+    std::int32_t* strand = strand_.data();
+    backend_.parallel_for(
+        "number strands", strands,
+        [=] RINGLET_LAMBDA(std::int32_t s) {
+          for (std::int32_t p = first[s]; p < first[s + 1]; ++p) strand[p] = p + 1 < first[s + 1] ? s : -1;
+        },
+        kStrandChunk);
+  }
+
+  // Where a strand has its values in the state's arrays.
+  struct StrandRows {
+    std::int64_t values;  // of three components: kLanes apart, its particles 3 kLanes
+    std::int64_t scalars;
+    std::int64_t root;
+
+    RINGLET_KERNEL StrandRows(const HairContactStep<T>& step, std::int32_t s) {
+      const std::int32_t batch = step.order[s] / kLanes, lane = step.order[s] % kLanes;
+      const std::int64_t row = step.batches.row[batch];
+      values = row * 3 * kLanes + lane, scalars = row * kLanes + lane;
+      root = static_cast<std::int64_t>(batch) * 3 * kLanes + lane;
+    }
+  };
+
+  // Of a root point against that of the first strand: places are small numbers wherever the groom is. [3]
+  RINGLET_KERNEL static Vector3<T> root_of(const HairContactStep<T>& step, const StrandRows& rows,
+                                           const double* root_points) {
+    const double *root = root_points + rows.root, *origin = root_points + StrandRows(step, 0).root;
+    return {static_cast<T>(root[0] - origin[0]), static_cast<T>(root[kLanes] - origin[kLanes]),
+            static_cast<T>(root[2 * kLanes] - origin[2 * kLanes])};
+  }
+  RINGLET_KERNEL static Vector3<T> value_at(const T* values) {
+    return {values[0], values[kLanes], values[2 * kLanes]};
+  }
+
+  void lay_out(const HairContactStep<T>& step, LaidOut what) {
+    start_.resize(particles_), end_.resize(particles_), velocity_.resize(particles_);
+    Place<T>*start = start_.data(), *end = end_.data(), *velocity = velocity_.data();
+    const std::int32_t* first = first_.data();
+    backend_.parallel_for(
+        "lay out contacts", step.strands,
+        [=] RINGLET_LAMBDA(std::int32_t s) {
+          const StrandRows rows(step, s);
+          const Vector3<T> root = root_of(step, rows, step.root_points),
+                           start_root = root_of(step, rows, step.start_root_points);
+          std::int64_t at = rows.values, scalar = rows.scalars;
+          for (std::int32_t p = first[s]; p < first[s + 1]; ++p, at += 3 * kLanes, scalar += kLanes) {
+            const Vector3<T> now = root + value_at(step.state.position + at);
+            end[p] = {now.x, now.y, now.z, step.radius[scalar]};
+            if (what == kEndsOnly) continue;
+            const Vector3<T> then = start_root + value_at(step.start + at),
+                             v = value_at(step.state.velocity + at);
+            start[p] = {then.x, then.y, then.z, p - first[s] < step.clamped ? T(0) : T(1)};
+            velocity[p] = {v.x, v.y, v.z, T(0)};
+          }
+        },
+        kStrandChunk);
+  }
+
+  // What is known of the pairs, and which of them each segment has.
+  void list_pairs(std::int32_t fresh) {
+    const std::int32_t pairs = fresh + standing_.count();
+    load_.resize(particles_), kappa_.resize(first_.size() - 1), side_.resize(pairs + kWidth);
+    record_.resize(pairs + kWidth), active_.resize(pairs + kWidth), contacts_.resize(particles_);
+    list_first_.resize(particles_ + 1), cursor_.resize(particles_),
+        list_entry_.resize(2 * static_cast<std::size_t>(pairs));
+    standing_.add(backend_, neighbours_.a(), neighbours_.b(), side_.data(), fresh, kWidth, particles_);
+    pairs_ = {neighbours_.a(), neighbours_.b(),  side_.data(), record_.data(),
+              active_.data(),  contacts_.data(), pairs};
+    std::int32_t *first = list_first_.data(), *cursor = cursor_.data(), *entry = list_entry_.data();
+    const std::int32_t *a = pairs_.a, *b = pairs_.b;
+    backend_.parallel_for("clear lists", particles_ + 1,
+                          [=] RINGLET_LAMBDA(std::int32_t p) { first[p] = 0; });
+    backend_.parallel_for("count lists", pairs, [=] RINGLET_LAMBDA(std::int32_t k) {
+      atomic_add(&first[a[k]], 1), atomic_add(&first[b[k]], 1);
+    });
+    backend_.scan("start lists", list_first_, particles_ + 1);
+    backend_.parallel_for("copy lists", particles_,
+                          [=] RINGLET_LAMBDA(std::int32_t p) { cursor[p] = first[p]; });
+    // In no particular order: what is summed over a list is the same in any.
+    backend_.parallel_for("fill lists", pairs, [=] RINGLET_LAMBDA(std::int32_t k) {
+      entry[atomic_add(&cursor[a[k]], 1)] = 2 * k, entry[atomic_add(&cursor[b[k]], 1)] = 2 * k + 1;
+    });
+  }
+
+  // Returns how many contacts there are.
+  std::int64_t find() {
+    std::int32_t* contacts = contacts_.data();
+    backend_.parallel_for("clear contacts", particles_,
+                          [=] RINGLET_LAMBDA(std::int32_t p) { contacts[p] = 0; });
+    backend_.parallel_for("find contacts", packs(), FindContacts<R>{pairs_, places()}, kPackChunk);
+    return static_cast<std::int64_t>(backend_.sum(
+               "count contacts", particles_,
+               [=] RINGLET_LAMBDA(std::int32_t p) { return static_cast<double>(contacts[p]); })) /
+           2;
+  }
+
+  void answer(const HairContactStep<T>& step) {
+    const ContactStrands<T> work{pairs_,        {list_first_.data(), list_entry_.data()},
+                                 first_.data(), start_.data(),
+                                 end_.data(),   velocity_.data(),
+                                 load_.data(),  kappa_.data(),
+                                 step.clamped};
+    backend_.parallel_for("respond to contacts", step.strands, FindResponse<T>{work}, kStrandChunk);
+    backend_.parallel_for("weigh contacts", packs(),
+                          WeighContacts<R>{pairs_, velocity_.data(), step.friction}, kPackChunk);
+    backend_.parallel_for("apply contacts", step.strands, ApplyContacts<T>{work}, kStrandChunk);
+  }
+
+  // What has not been touched stays as it is, bit for bit.
+  void write_back(const HairContactStep<T>& step) {
+    const Place<T>*end = end_.data(), *velocity = velocity_.data();
+    const std::int32_t* first = first_.data();
+    const double* kappa = kappa_.data();
+    backend_.parallel_for(
+        "hand back contacts", step.strands,
+        [=] RINGLET_LAMBDA(std::int32_t s) {
+          if (kappa[s] < 0) return;
+          const StrandRows rows(step, s);
+          const Vector3<T> root = root_of(step, rows, step.root_points);
+          for (std::int32_t i = step.clamped, p = first[s] + i; p < first[s + 1]; ++i, ++p) {
+            T *x = step.state.position + rows.values + i * 3 * kLanes,
+              *v = step.state.velocity + rows.values + i * 3 * kLanes;
+            const Vector3<T> moved = vector_of(end[p]) - (root + value_at(x));
+            x[0] += moved.x, x[kLanes] += moved.y, x[2 * kLanes] += moved.z;
+            v[0] = velocity[p].x, v[kLanes] = velocity[p].y, v[2 * kLanes] = velocity[p].z;
+          }
+        },
+        kStrandChunk);
+  }
+
+  Backend backend_;
+  Neighbours<Backend, F, R> neighbours_;
+  StandingCrossings<Backend, R> standing_;
+  bool settled_ = true;  // standing_ is by how the strands are
+  ContactPairs<T> pairs_{};
+  std::int32_t particles_ = 0;
+  Buffer<Place<T>> start_, end_, velocity_;
+  Buffer<std::int32_t> first_, strand_, contacts_, list_first_, list_entry_, cursor_;
+  Buffer<ContactRecord<T>> record_;
+  Buffer<unsigned char> active_;
+  Buffer<signed char> side_;
+  Buffer<ParticleLoad> load_;
+  Buffer<double> kappa_;
+};
+
+}  // namespace RINGLET_ISA
+}  // namespace ringlet::kernels

@@ -1,0 +1,154 @@
+// Segments that are through one another still when an application ends: which side they belong on is kept, or
+// hair that did not get back at once would have got through for good.
+#pragma once
+#include "kernels/contact/contact_passes.h"
+
+namespace ringlet::kernels {
+inline namespace RINGLET_ISA {
+
+// A pair of segments as one number, with its side: such lists are sorted by it, so that each is there once.
+struct StandingKey {
+  int bits = 1;  // of a segment's number
+
+  explicit StandingKey(std::int32_t particles) {
+    while (particles >> bits) ++bits;
+  }
+  RINGLET_KERNEL std::uint64_t key(std::int32_t a, std::int32_t b, bool negative) const {
+    return ((static_cast<std::uint64_t>(a) << bits | static_cast<std::uint64_t>(b)) << 1) |
+           (negative ? 1 : 0);
+  }
+  RINGLET_KERNEL std::int32_t a(std::uint64_t key) const {
+    return static_cast<std::int32_t>(key >> (bits + 1));
+  }
+  RINGLET_KERNEL std::int32_t b(std::uint64_t key) const {
+    return static_cast<std::int32_t>(key >> 1 & ((std::uint64_t{1} << bits) - 1));
+  }
+  RINGLET_KERNEL signed char side(std::uint64_t key) const { return key & 1 ? -1 : 1; }
+};
+
+// Looks at the pairs of an application, with what moved after it: those through one another are written, each
+// as the two segments that now cut through one another. For a pack of pairs.
+template <class R>
+struct FindStanding {
+  using T = Scalar<R>;
+  static constexpr int kWidth = Traits<R>::kWidth;
+  ContactPairs<T> pairs;
+  HairPlaces<T> places;
+  T deepest;  // [m]
+  StandingKey key;
+  std::uint64_t* found;
+  std::int32_t* count;
+  std::int32_t room;
+
+  RINGLET_FUNCTION void operator()(std::int32_t pack) const {
+    const std::int32_t first = pack * kWidth;
+    const PackOfPairs<R> gathered(places, pairs.a + first, pairs.b + first);
+    const SegmentPair<R> pair = gathered.places();
+    const R side = load_sides<R>(pairs.side + first);
+    const PairContact<R> contact = find_contact(pair, gathered.largest_reach(), side);
+    std::uint32_t through = lane_bits(contact.crossed & (contact.distance < R(0)));
+    if (pairs.count - first < kWidth) through &= ~(~0u << (pairs.count - first));
+    if (through == 0) return;
+    const std::uint32_t known = lane_bits((side < R(0)) | (side > R(0))),
+                        negative_side = lane_bits(side < R(0)),
+                        negative_start = lane_bits(tetrahedron_volume(pair.a_start, pair.b_start) < R(0));
+    const std::uint32_t negative = (known & negative_side) | (~known & negative_start);
+    for (; through; through &= through - 1) {
+      const int lane = __builtin_ctz(through);
+      write(pairs.a[first + lane], pairs.b[first + lane], (negative >> lane & 1) != 0);
+    }
+  }
+
+ private:
+  static constexpr int kAround = 2;  // segments that a crossing may have slid along
+
+  // The nearest along the strands.
+  RINGLET_FUNCTION void write(std::int32_t a, std::int32_t b, bool negative) const {
+    for (int far = 0; far <= kAround; ++far)
+      for (int i = -far; i <= far; ++i)
+        for (int j = -far; j <= far; ++j) {
+          if (i != far && i != -far && j != far && j != -far) continue;
+          const std::int32_t one = a + i, other = b + j;
+          if (!places.on_one_strand(a, one) || !places.on_one_strand(b, other) || !cut(one, other, negative))
+            continue;
+          const std::int32_t at = atomic_add(count, 1);
+          if (at < room) found[at] = key.key(one, other, negative);
+          return;
+        }
+  }
+  RINGLET_KERNEL bool cut(std::int32_t a, std::int32_t b, bool negative) const {
+    const Segment<T> one = segment_at<T>(places.end, a), other = segment_at<T>(places.end, b);
+    if ((tetrahedron_volume(one, other) < T(0)) == negative) return false;
+    const LineProducts<T> products(one.along(), other.along(), other.begin - one.begin);
+    if (products.determinant <= parallel_sine2<T>() * (products.uu * products.ww)) return false;
+    const PairContact<T> contact =
+        standing_contact(SegmentPair<T>{one, other, one, other}, products, negative ? T(-1) : T(1));
+    return contact.crossed && -contact.distance < deepest;
+  }
+};
+
+template <class Backend, class R>
+class StandingCrossings {
+ public:
+  using T = Scalar<R>;
+
+  std::int32_t count() const { return count_; }
+  void clear() { count_ = 0; }
+
+  // Those among an application's pairs, by where the segments are at the end.
+  void find(Backend& backend, const ContactPairs<T>& pairs, const HairPlaces<T>& places) {
+    const StandingKey key(places.particles);
+    constexpr int kWidth = Traits<R>::kWidth, kPackChunk = 128;
+    taken_.resize(1);
+    std::int32_t room;
+    do {
+      room = static_cast<std::int32_t>(key_.size());
+      std::int32_t* taken = taken_.data();
+      backend.parallel_for("clear standing", 1, [=] RINGLET_LAMBDA(std::int32_t) { *taken = 0; });
+      const FindStanding<R> found{pairs, places, T(kDeepest), key, key_.data(), taken, room};
+      backend.parallel_for("find standing", (pairs.count + kWidth - 1) / kWidth, found, kPackChunk);
+      count_ = static_cast<std::int32_t>(backend.largest(
+          "standing", 1, 0, [=] RINGLET_LAMBDA(std::int32_t) { return static_cast<double>(*taken); }));
+      if (count_ > room) key_.resize(count_), order_.resize(count_);
+    } while (count_ > room);
+    backend.sort("sort standing", key_, order_, count_, 2 * key.bits + 1);
+  }
+
+  // Behind the `fresh` pairs that there are; the others' sides are those of the start. Sides and pairs of
+  // `padding` more are set, for packs that read past the end.
+  void add(Backend& backend, std::int32_t* a, std::int32_t* b, signed char* side, std::int32_t fresh,
+           std::int32_t padding, std::int32_t particles) const {
+    const std::uint64_t* keys = key_.data();
+    const StandingKey key(particles);
+    const std::int32_t pairs = fresh + count_;
+    backend.parallel_for("add standing", count_, [=] RINGLET_LAMBDA(std::int32_t k) {
+      a[fresh + k] = key.a(keys[k]), b[fresh + k] = key.b(keys[k]), side[fresh + k] = key.side(keys[k]);
+    });
+    backend.parallel_for("sides of pairs", fresh, [=] RINGLET_LAMBDA(std::int32_t k) { side[k] = 0; });
+    backend.parallel_for("pad pairs", padding, [=] RINGLET_LAMBDA(std::int32_t k) {
+      a[pairs + k] = a[0], b[pairs + k] = b[0], side[pairs + k] = 0;
+    });
+  }
+
+  void copy_to(std::uint64_t* keys) const {
+    for (std::int32_t k = 0; k < count_; ++k) keys[k] = key_.data()[k];
+  }
+  void copy_from(const std::uint64_t* keys, std::int32_t count) {
+    key_.resize(count), order_.resize(count);
+    for (std::int32_t k = 0; k < count; ++k) key_.data()[k] = keys[k];
+    count_ = count;
+  }
+  std::size_t bytes() const { return key_.bytes() + order_.bytes() + taken_.bytes(); }
+
+ private:
+  // Of two that are farther through one another than this nobody can tell any more how they got there [m].
+  static constexpr double kDeepest = 0.03;
+
+  std::int32_t count_ = 0;
+  typename Backend::template Buffer<std::uint64_t> key_;
+  typename Backend::template Buffer<std::uint32_t> order_;
+  typename Backend::template Buffer<std::int32_t> taken_;
+};
+
+}  // namespace RINGLET_ISA
+}  // namespace ringlet::kernels

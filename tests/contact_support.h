@@ -77,7 +77,7 @@ class HairRun {
 
   // As the state now is.
   const kernels::HairContactStep<T>& contact_step() {
-    step.batches = model.view(), step.row_count = static_cast<std::int32_t>(model.layout.rows());
+    step.batches = model.view();
     step.order = order_.data(), step.strands = static_cast<std::int32_t>(order_.size());
     step.state = state.view(), step.radius = radius_.data();
     step.start = start_.data(), step.start_root_points = start_roots_.data();

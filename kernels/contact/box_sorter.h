@@ -73,8 +73,10 @@ class BoxSorter {
     Piece* piece = cut_.data();
     backend.parallel_for("cut segments", particles, [=] RINGLET_LAMBDA(std::int32_t p) {
       const std::int32_t pieces = start[p + 1] - start[p];
+      const float share = 1 / static_cast<float>(pieces > 0 ? pieces : 1);
       for (std::int32_t k = 0; k < pieces; ++k)
-        piece[start[p] + k] = {p, static_cast<std::int16_t>(k), static_cast<std::int16_t>(pieces)};
+        piece[start[p] + k] = {p, static_cast<float>(k) * share,
+                               k + 1 < pieces ? static_cast<float>(k + 1) * share : 1.0f, carried[p].extra};
     });
     return boxes;
   }

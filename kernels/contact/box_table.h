@@ -83,14 +83,11 @@ struct BoxLevels {
 // One of a segment's equal pieces.
 struct Piece {
   std::int32_t segment;
-  std::int16_t number, pieces;
+  float from, to;  // along the segment, in its lengths
+  float stray;     // of the segment, see MotionField [m]
 
-  // Whether the place `at` in [0, 1] along the segment is on it.
-  template <class T>
-  RINGLET_KERNEL bool holds(T at) const {
-    const auto there = static_cast<std::int32_t>(at * T(pieces));
-    return (there < pieces ? there : pieces - 1) == number;
-  }
+  // Whether the place `at` in [0, 1] along the segment is on it: on one of its pieces.
+  RINGLET_KERNEL bool holds(float at) const { return from <= at && (at < to || to >= 1); }
 };
 
 // Sorted by cell, and within a cell by segment.

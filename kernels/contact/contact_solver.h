@@ -37,9 +37,11 @@ class ContactSolver : public HairContacts<Scalar<R>> {
     pairs_.count = 0;
     number_particles(step);
     lay_out(step, kAll);
-    const std::int32_t fresh = neighbours_.find(backend_, places(), standing_.count());
-    figures.pairs = fresh + standing_.count();
-    if (figures.pairs > 0) list_pairs(fresh);
+    const std::int32_t found = neighbours_.find(backend_, places());
+    pairs_.count = list_.make(backend_, neighbours_.a(), neighbours_.b(), found, standing_.keys(),
+                              standing_.count(), particles_, kWidth);
+    figures.pairs = pairs_.count;
+    if (pairs_.count > 0) index_pairs();
     return figures;
   }
 
@@ -69,14 +71,23 @@ class ContactSolver : public HairContacts<Scalar<R>> {
 
   std::int32_t kept() const override { return standing_.count(); }
   void copy_kept(std::uint64_t* to) const override { standing_.copy_to(to); }
-  void keep(const std::uint64_t* kept, std::int32_t count) override {
+  bool keep(const std::uint64_t* kept, std::int32_t count) override {
+    const PairKey key(particles_);
+    const std::int32_t* strand = strand_.data();
+    for (std::int32_t k = 0; k < count; ++k) {
+      const std::int32_t a = key.a(kept[k]), b = key.b(kept[k]);
+      const bool there = kept[k] >> key.total_bits() == 0 && (kept[k] & 3) != PairKey::kFresh &&
+                         (kept[k] & 3) <= PairKey::kFresh && a < b && b < particles_;
+      if (!there || strand[a] < 0 || strand[b] < 0 || strand[a] == strand[b]) return false;
+    }
     standing_.copy_from(kept, count), settled_ = true;
+    return true;
   }
 
   std::size_t bytes() const override {
     return backend_.bytes() + first_.bytes() + strand_.bytes() + start_.bytes() + end_.bytes() +
            velocity_.bytes() + contacts_.bytes() + list_first_.bytes() + list_entry_.bytes() +
-           cursor_.bytes() + record_.bytes() + active_.bytes() + side_.bytes() + load_.bytes() +
+           cursor_.bytes() + record_.bytes() + active_.bytes() + list_.bytes() + load_.bytes() +
            kappa_.bytes() + neighbours_.bytes() + standing_.bytes();
   }
 
@@ -157,16 +168,14 @@ class ContactSolver : public HairContacts<Scalar<R>> {
         kStrandChunk);
   }
 
-  // What is known of the pairs, and which of them each segment has.
-  void list_pairs(std::int32_t fresh) {
-    const std::int32_t pairs = fresh + standing_.count();
-    load_.resize(particles_), kappa_.resize(first_.size() - 1), side_.resize(pairs + kWidth);
-    record_.resize(pairs + kWidth), active_.resize(pairs + kWidth), contacts_.resize(particles_);
+  // Which pairs each segment has.
+  void index_pairs() {
+    const std::int32_t pairs = pairs_.count;
+    load_.resize(particles_), kappa_.resize(first_.size() - 1), contacts_.resize(particles_);
+    record_.resize(pairs + kWidth), active_.resize(pairs + kWidth);
     list_first_.resize(particles_ + 1), cursor_.resize(particles_),
         list_entry_.resize(2 * static_cast<std::size_t>(pairs));
-    standing_.add(backend_, neighbours_.a(), neighbours_.b(), side_.data(), fresh, kWidth, particles_);
-    pairs_ = {neighbours_.a(), neighbours_.b(),  side_.data(), record_.data(),
-              active_.data(),  contacts_.data(), pairs};
+    pairs_ = {list_.a(), list_.b(), list_.side(), record_.data(), active_.data(), contacts_.data(), pairs};
     std::int32_t *first = list_first_.data(), *cursor = cursor_.data(), *entry = list_entry_.data();
     const std::int32_t *a = pairs_.a, *b = pairs_.b;
     backend_.parallel_for("clear lists", particles_ + 1,
@@ -232,6 +241,7 @@ class ContactSolver : public HairContacts<Scalar<R>> {
   Backend backend_;
   Neighbours<Backend, F, R> neighbours_;
   StandingCrossings<Backend, R> standing_;
+  PairList<Backend> list_;
   bool settled_ = true;  // standing_ is by how the strands are
   ContactPairs<T> pairs_{};
   std::int32_t particles_ = 0;
@@ -239,7 +249,6 @@ class ContactSolver : public HairContacts<Scalar<R>> {
   Buffer<std::int32_t> first_, strand_, contacts_, list_first_, list_entry_, cursor_;
   Buffer<ContactRecord<T>> record_;
   Buffer<unsigned char> active_;
-  Buffer<signed char> side_;
   Buffer<ParticleLoad> load_;
   Buffer<double> kappa_;
 };

@@ -19,7 +19,6 @@ struct HairContactFigures {
 template <class T>
 struct HairContactStep {
   StrandBatches<T> batches;
-  std::int32_t row_count;     // batches.row[batches.batches], which may be out of the host's reach
   const std::int32_t* order;  // [strands] as batch * kLanes + lane, by their roots
   std::int32_t strands;
   StrandState<T> state;             // at the end; changed
@@ -44,10 +43,11 @@ class HairContacts {
   virtual std::int64_t pass(const HairContactStep<T>& step) = 0;
   // Sets the figures' crossings and depth, by the state as it now is.
   virtual void count_crossings(const HairContactStep<T>& step, HairContactFigures& figures) = 0;
-  // What `settle` kept, to go on from there another time: how many numbers, and the numbers.
+  // What `settle` kept, to go on from there another time: how many numbers, and the numbers. `keep` is for
+  // after a `begin` with the same strands; false, and nothing kept, where these are no numbers of theirs.
   virtual std::int32_t kept() const = 0;
   virtual void copy_kept(std::uint64_t* to) const = 0;
-  virtual void keep(const std::uint64_t* kept, std::int32_t count) = 0;
+  virtual bool keep(const std::uint64_t* kept, std::int32_t count) = 0;
   virtual std::size_t bytes() const = 0;
 };
 

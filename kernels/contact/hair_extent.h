@@ -9,6 +9,7 @@ inline namespace RINGLET_ISA {
 struct HairExtent {
   float low[3], high[3];
   float segment_length;  // mean
+  double segments;       // that there are, not flung far away
 
   RINGLET_KERNEL float longest() const {
     float size = 1e-3f;
@@ -45,9 +46,10 @@ HairExtent find_extent(Backend& backend, const Place<T>* places, const std::int3
       return strand[p] >= 0 && away(p, near.middle) <= near.most ? static_cast<double>(values(p)) : 0.0;
     });
   };
-  double segments = 1;
+  double segments = 0;
   for (int k = 0; k < kTimes; ++k) {
-    segments = max(sum([=] RINGLET_LAMBDA(std::int32_t) { return 1.0; }), 1.0);
+    segments = sum([=] RINGLET_LAMBDA(std::int32_t) { return 1.0; });
+    if (segments == 0) return {};
     double mean[3];
     for (int c = 0; c < 3; ++c)
       mean[c] = sum([=] RINGLET_LAMBDA(std::int32_t p) { return (&places[p].x)[c]; }) / segments;
@@ -74,6 +76,7 @@ HairExtent find_extent(Backend& backend, const Place<T>* places, const std::int3
     return size < T(1e3) ? size : T(0);  // 0 also for what is not a number
   });
   extent.segment_length = max(static_cast<float>(total / segments), 1e-6f);
+  extent.segments = segments;
   return extent;
 }
 

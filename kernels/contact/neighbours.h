@@ -1,9 +1,10 @@
 // The pairs of segments that contacts look at, found anew in each application.
 //
 // In dense hair most of what a segment would go through by the end it never gets to, where what it meets
-// first holds it; yet to look for all of it is most of the work. So the search has two rounds. In the first,
-// segments go no farther than a few of the hair's spacings against its mean motion; in the second, those that
-// have met few others go on to the end, among themselves.
+// first holds it; yet to look for all of it is most of the work. So the search goes in rounds. In the first,
+// segments look about where they start, a small part of the hair's spacing wide; in each that follows those
+// that have met little go on, among themselves, farther along their way against the hair's mean motion; in
+// the last to the end.
 #pragma once
 #include "kernels/contact/box_sorter.h"
 #include "kernels/contact/pair_search.h"
@@ -19,9 +20,12 @@ class Neighbours {
   template <class V>
   using Buffer = typename Backend::template Buffer<V>;
 
-  // Returns how many pairs there are; they hold until the next call. There is room for `more` behind them.
-  std::int32_t find(Backend& backend, const HairPlaces<T>& places, std::int32_t more) {
+  // Returns how many pairs were found, some of them in several rounds; they hold until the next call.
+  std::int32_t find(Backend& backend, const HairPlaces<T>& places) {
     const HairExtent extent = find_extent(backend, places.start, places.strand, places.particles);
+    rounds_taken_ = 0;
+    if (extent.segments == 0) return 0;
+    most_looked_at_ = max(static_cast<double>(kMostLookedAt), 2.0 * extent.segments);
     motion_.find(backend, places, extent);
     thickest_ =
         static_cast<T>(backend.largest("radius", places.particles, 0, [=] RINGLET_LAMBDA(std::int32_t p) {
@@ -32,11 +36,11 @@ class Neighbours {
                            motion_.slope(), kFewSpacings * spacing, kPieceSpacings * spacing};
     meetings_.resize(places.particles), last_round_.resize(places.particles);
     search(backend, places, swept);
-    return gather_pairs(backend, more);
+    return gather_pairs(backend);
   }
 
-  std::int32_t* a() { return a_.data(); }
-  std::int32_t* b() { return b_.data(); }
+  const std::int32_t* a() const { return a_.data(); }
+  const std::int32_t* b() const { return b_.data(); }
   std::size_t bytes() const {
     std::size_t rounds = 0;
     for (const auto& round : rounds_) rounds += round.bytes();
@@ -49,7 +53,7 @@ class Neighbours {
   // Another round is not begun where it would be more work than this: hits are some 8 times those of the one
   // before, which went a quarter as far.
   static constexpr double kMostHits = 1 << 24, kHitsGrow = 8;
-  static constexpr float kFewSpacings = 0.08f, kPieceSpacings = 3, kFartherEachRound = 4;
+  static constexpr float kFewSpacings = 0.08f, kPieceSpacings = 4.5f, kFartherEachRound = 4;
   static constexpr std::int32_t kFewNeighbours = 4;
   static constexpr int kSearchChunk = 4;  // groups
 
@@ -90,7 +94,9 @@ class Neighbours {
                          [=] RINGLET_LAMBDA(std::int32_t p) { last_round[p] = 0, meetings[p] = 0; });
     for (int round = 0; round < kRounds; ++round) {
       swept.from_anywhere = round == 0;
+      rounds_taken_ = round;
       const double hits = search_round(backend, round, places, swept);
+      if (hits < 0) return;
       rounds_taken_ = round + 1;
       if (round > 0 && kHitsGrow * hits > kMostHits) return;
       const float farthest = swept.farthest;
@@ -112,12 +118,12 @@ class Neighbours {
     return !(dot(way, way) <= farthest * farthest);
   }
 
-  // Returns how many pairs of boxes met.
+  // Returns how many pairs of boxes met, -1 where nobody looks.
   double search_round(Backend& backend, int round, const HairPlaces<T>& places, const SweptBoxes& swept) {
     const signed char* last_round = last_round_.data();
     const BoxTable table = sorter_.sort(
         backend, places, swept, [=] RINGLET_LAMBDA(std::int32_t p) { return last_round[p] == round; });
-    if (table.boxes == 0) return 0;
+    if (table.boxes == 0) return -1;
     const std::int32_t groups = (table.boxes + kGroupPieces - 1) / kGroupPieces;
     hits_.resize(groups);
     std::int32_t *meetings = meetings_.data(), *hits = hits_.data();
@@ -125,7 +131,7 @@ class Neighbours {
       backend.parallel_for("clear meetings", places.particles,
                            [=] RINGLET_LAMBDA(std::int32_t p) { meetings[p] = 0; });
       const T far = T(2 * swept.along_both()) + 2 * T(kNear) * thickest_;
-      const PairSearch<F, R> search{table, places, swept.carried, far, meetings, hits, pool};
+      const PairSearch<F, R> search{table, places, far, meetings, hits, pool};
       backend.parallel_for("contact pairs", groups, search, kSearchChunk);
     });
     return backend.sum("hits", groups,
@@ -136,22 +142,21 @@ class Neighbours {
     PairPool pool[kRounds];
     std::int32_t first[kRounds];  // group of each round
     int rounds, limit;
-    const signed char* last_round;
 
-    // Calls visit(pair) for what is kept of a group. What two found that both went on they found again.
+    // Calls visit(pair) for what is kept of a group.
     template <class Visit>
     RINGLET_KERNEL void for_kept(std::int32_t group, const Visit& visit) const {
       int round = rounds - 1;
       while (group < first[round]) --round;
       pool[round].for_pairs(group - first[round], [&](const RankedPair& pair) {
-        if (pair.rank < limit && (last_round[pair.a] <= round || last_round[pair.b] <= round)) visit(pair);
+        if (pair.rank < limit) visit(pair);
       });
     }
   };
 
   // Those of all rounds in one list, in the order of the tables. What the first found of two that went on the
   // second found again.
-  std::int32_t gather_pairs(Backend& backend, std::int32_t more) {
+  std::int32_t gather_pairs(Backend& backend) {
     const std::int32_t limit = rank_limit(backend);
     std::int32_t groups = 0;
     FoundPairs found{};
@@ -159,7 +164,7 @@ class Neighbours {
       found.pool[round] = rounds_[round].pool(), found.first[round] = groups;
       groups += rounds_[round].groups();
     }
-    found.rounds = rounds_taken_, found.limit = limit, found.last_round = last_round_.data();
+    found.rounds = rounds_taken_, found.limit = limit;
     kept_.resize(groups + 1);
     std::int32_t* kept = kept_.data();
     backend.parallel_for(
@@ -170,8 +175,7 @@ class Neighbours {
         },
         kSearchChunk);
     const std::int32_t pairs = backend.scan("start pairs", kept_, groups + 1);
-    constexpr int kPad = 16;
-    a_.resize(pairs + more + kPad), b_.resize(pairs + more + kPad);
+    a_.resize(pairs), b_.resize(pairs);
     std::int32_t *a = a_.data(), *b = b_.data();
     backend.parallel_for(
         "gather pairs", groups,
@@ -201,18 +205,19 @@ class Neighbours {
           },
           kSearchChunk);
     }
+    const double most = most_looked_at_;
     return static_cast<std::int32_t>(backend.largest("ranks", 1, 0, [=] RINGLET_LAMBDA(std::int32_t) {
       std::int32_t rank = 0;
       for (std::int64_t pairs = 0; rank < kRanks; ++rank) {
         pairs += ranks[rank];
-        if (rank >= kLeastPairs && pairs > kMostLookedAt) break;
+        if (rank >= kLeastPairs && static_cast<double>(pairs) > most) break;
       }
       return static_cast<double>(rank);
     }));
   }
 
-  // Where there are more pairs, each piece looks at fewer of its own, those that matter most; never at fewer
-  // than kLeastPairs.
+  // Where there are more pairs than these and than two a segment, each piece looks at fewer of its own, those
+  // that matter most; never at fewer than kLeastPairs.
   static constexpr std::int64_t kMostLookedAt = 1 << 18;
   static constexpr std::int32_t kLeastPairs = 1;
 
@@ -220,6 +225,7 @@ class Neighbours {
   BoxSorter<Backend, T> sorter_;
   PairMemory<Backend> rounds_[kRounds];
   int rounds_taken_ = 0;
+  double most_looked_at_ = 0;
   T thickest_ = T(0);  // radius [m]
   Buffer<std::int32_t> crowd_, meetings_, hits_, kept_, ranks_, a_, b_;
   Buffer<signed char> last_round_;  // [particles] that each segment looks in

@@ -17,7 +17,6 @@ struct PairSearch {
 
   BoxTable table;
   HairPlaces<T> places;
-  const Place<float>* carried;  // see MotionField
   T far;  // lines are left out that are farther apart at the start, but for how they stray [m]
   std::int32_t*
       meetings;  // [particles] how many pairs each segment is in, and kCrossing more for each that crosses
@@ -42,13 +41,6 @@ struct PairSearch {
   }
 
  private:
-  // Where on its segment a piece is, in its lengths.
-  struct PieceRange {
-    T middle, half;
-    RINGLET_KERNEL explicit PieceRange(const Piece& piece)
-        : middle((T(piece.number) + T(0.5)) / T(piece.pieces)), half(T(0.51) / T(piece.pieces)) {}
-  };
-
   // Of the table, to look through.
   struct Runs {
     static constexpr int kRoom = 256;
@@ -198,19 +190,19 @@ struct PairSearch {
                                   const std::int32_t* pieces) const {
     const LineProducts<R> lines(a.along(), b.along(), b.begin - a.begin);
     const R sine2 = fma(parallel_sine2<R>() * lines.uu, lines.ww, lines.determinant);
-    const PieceRange own(table.piece[i]);
-    alignas(64) T middle[kPairs], half[kPairs], stray[kPairs];
+    const Piece& own = table.piece[i];
+    alignas(64) T from[kPairs], to[kPairs], stray[kPairs];
     for (int lane = 0; lane < kPairs; ++lane) {
-      const PieceRange range(table.piece[pieces[lane]]);
-      middle[lane] = range.middle, half[lane] = range.half;
-      stray[lane] = T(carried[table.piece[pieces[lane]].segment].extra);
+      const Piece& piece = table.piece[pieces[lane]];
+      from[lane] = piece.from, to[lane] = piece.to, stray[lane] = piece.stray;
     }
-    const R most = R(far + T(carried[table.piece[i].segment].extra)) + load<R>(stray),
-            volume = tetrahedron_volume(a, b);
+    const R most = R(far + T(own.stray)) + load<R>(stray), volume = tetrahedron_volume(a, b);
     // Places shift by the distance over the sine of the angle.
     const R per_sine = most * inverse_or_zero(sqrt(lines.determinant), R(T(1e-18)));
-    const Mask<R> on_a = abs(lines.s() - R(own.middle)) <= fma(per_sine, sqrt(lines.ww), R(own.half)),
-                  on_b = abs(lines.u() - load<R>(middle)) <= fma(per_sine, sqrt(lines.uu), load<R>(half));
+    const R s = lines.s(), u = lines.u(), shift_a = per_sine * sqrt(lines.ww),
+            shift_b = per_sine * sqrt(lines.uu);
+    const Mask<R> on_a = (R(T(own.from)) - shift_a <= s) & (s <= R(T(own.to)) + shift_a),
+                  on_b = (load<R>(from) - shift_b <= u) & (u <= load<R>(to) + shift_b);
     const Mask<R> parallel = lines.determinant <= R(T(1e-4)) * lines.uu * lines.ww;
     return (volume * volume <= most * most * sine2) & (parallel | (on_a & on_b));
   }
@@ -239,12 +231,13 @@ struct PairSearch {
       if (count - k < kPairs) found &= ~(~0u << (count - k));
       if (found == 0) continue;
       alignas(64) T key[kPairs], on_a[kPairs], on_b[kPairs];
-      store(key, select(contact.crossed, -contact.later, contact.distance));
+      store(key, select(contact.crossed, R(-1) - contact.later, contact.distance));
       store(on_a, contact.s), store(on_b, contact.u);
       for (; found; found &= found - 1) {
         const int lane = __builtin_ctz(found);
         const std::int32_t i = suspects.a_piece[k + lane];
-        if (!table.piece[i].holds(on_a[lane]) || !table.piece[suspects.b_piece[k + lane]].holds(on_b[lane]))
+        if (!table.piece[i].holds(static_cast<float>(on_a[lane])) ||
+            !table.piece[suspects.b_piece[k + lane]].holds(static_cast<float>(on_b[lane])))
           continue;
         if (work.chosen.piece != i) write(work), work.chosen.piece = i, work.chosen.a = a[lane];
         work.chosen.offer(b[lane], key[lane]);

@@ -246,8 +246,10 @@ RINGLET_FUNCTION PairContact<R> find_contact(const SegmentPair<R>& pair, R reach
   if (some(turned & standing)) take(turned & standing, standing_contact(pair, products, first));
   if (some(parallel)) {
     const PairContact<R> beside = parallel_contact(pair, products, reach);
-    contact.crossed = contact.crossed | (beside.crossed & parallel);
+    contact.crossed = contact.crossed | (beside.crossed & parallel & !standing);
     set_contact(parallel, beside, contact);
+    // Of these nobody can tell on which side they are.
+    contact.normal = select(parallel & standing, zero3<R>(), contact.normal);
   }
   return contact;
 }

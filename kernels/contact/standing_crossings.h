@@ -1,30 +1,10 @@
 // Segments that are through one another still when an application ends: which side they belong on is kept, or
 // hair that did not get back at once would have got through for good.
 #pragma once
-#include "kernels/contact/contact_passes.h"
+#include "kernels/contact/pair_list.h"
 
 namespace ringlet::kernels {
 inline namespace RINGLET_ISA {
-
-// A pair of segments as one number, with its side: such lists are sorted by it, so that each is there once.
-struct StandingKey {
-  int bits = 1;  // of a segment's number
-
-  explicit StandingKey(std::int32_t particles) {
-    while (particles >> bits) ++bits;
-  }
-  RINGLET_KERNEL std::uint64_t key(std::int32_t a, std::int32_t b, bool negative) const {
-    return ((static_cast<std::uint64_t>(a) << bits | static_cast<std::uint64_t>(b)) << 1) |
-           (negative ? 1 : 0);
-  }
-  RINGLET_KERNEL std::int32_t a(std::uint64_t key) const {
-    return static_cast<std::int32_t>(key >> (bits + 1));
-  }
-  RINGLET_KERNEL std::int32_t b(std::uint64_t key) const {
-    return static_cast<std::int32_t>(key >> 1 & ((std::uint64_t{1} << bits) - 1));
-  }
-  RINGLET_KERNEL signed char side(std::uint64_t key) const { return key & 1 ? -1 : 1; }
-};
 
 // Looks at the pairs of an application, with what moved after it: those through one another are written, each
 // as the two segments that now cut through one another. For a pack of pairs.
@@ -35,7 +15,7 @@ struct FindStanding {
   ContactPairs<T> pairs;
   HairPlaces<T> places;
   T deepest;  // [m]
-  StandingKey key;
+  PairKey key;
   std::uint64_t* found;
   std::int32_t* count;
   std::int32_t room;
@@ -46,11 +26,12 @@ struct FindStanding {
     const SegmentPair<R> pair = gathered.places();
     const R side = load_sides<R>(pairs.side + first);
     const PairContact<R> contact = find_contact(pair, gathered.largest_reach(), side);
-    std::uint32_t through = lane_bits(contact.crossed & (contact.distance < R(0)));
+    // What stood before may have slid along the strands, away from these segments.
+    const std::uint32_t known = lane_bits((side < R(0)) | (side > R(0)));
+    std::uint32_t through = lane_bits(contact.crossed & (contact.distance < R(0))) | known;
     if (pairs.count - first < kWidth) through &= ~(~0u << (pairs.count - first));
     if (through == 0) return;
-    const std::uint32_t known = lane_bits((side < R(0)) | (side > R(0))),
-                        negative_side = lane_bits(side < R(0)),
+    const std::uint32_t negative_side = lane_bits(side < R(0)),
                         negative_start = lane_bits(tetrahedron_volume(pair.a_start, pair.b_start) < R(0));
     const std::uint32_t negative = (known & negative_side) | (~known & negative_start);
     for (; through; through &= through - 1) {
@@ -72,7 +53,7 @@ struct FindStanding {
           if (!places.on_one_strand(a, one) || !places.on_one_strand(b, other) || !cut(one, other, negative))
             continue;
           const std::int32_t at = atomic_add(count, 1);
-          if (at < room) found[at] = key.key(one, other, negative);
+          if (at < room) found[at] = key.key(one, other, negative ? PairKey::kNegative : PairKey::kPositive);
           return;
         }
   }
@@ -97,7 +78,7 @@ class StandingCrossings {
 
   // Those among an application's pairs, by where the segments are at the end.
   void find(Backend& backend, const ContactPairs<T>& pairs, const HairPlaces<T>& places) {
-    const StandingKey key(places.particles);
+    const PairKey key(places.particles);
     constexpr int kWidth = Traits<R>::kWidth, kPackChunk = 128;
     taken_.resize(1);
     std::int32_t room;
@@ -111,25 +92,10 @@ class StandingCrossings {
           "standing", 1, 0, [=] RINGLET_LAMBDA(std::int32_t) { return static_cast<double>(*taken); }));
       if (count_ > room) key_.resize(count_), order_.resize(count_);
     } while (count_ > room);
-    backend.sort("sort standing", key_, order_, count_, 2 * key.bits + 1);
+    backend.sort("sort standing", key_, order_, count_, key.total_bits());
   }
 
-  // Behind the `fresh` pairs that there are; the others' sides are those of the start. Sides and pairs of
-  // `padding` more are set, for packs that read past the end.
-  void add(Backend& backend, std::int32_t* a, std::int32_t* b, signed char* side, std::int32_t fresh,
-           std::int32_t padding, std::int32_t particles) const {
-    const std::uint64_t* keys = key_.data();
-    const StandingKey key(particles);
-    const std::int32_t pairs = fresh + count_;
-    backend.parallel_for("add standing", count_, [=] RINGLET_LAMBDA(std::int32_t k) {
-      a[fresh + k] = key.a(keys[k]), b[fresh + k] = key.b(keys[k]), side[fresh + k] = key.side(keys[k]);
-    });
-    backend.parallel_for("sides of pairs", fresh, [=] RINGLET_LAMBDA(std::int32_t k) { side[k] = 0; });
-    backend.parallel_for("pad pairs", padding, [=] RINGLET_LAMBDA(std::int32_t k) {
-      a[pairs + k] = a[0], b[pairs + k] = b[0], side[pairs + k] = 0;
-    });
-  }
-
+  const std::uint64_t* keys() const { return key_.data(); }
   void copy_to(std::uint64_t* keys) const {
     for (std::int32_t k = 0; k < count_; ++k) keys[k] = key_.data()[k];
   }

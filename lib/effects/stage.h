@@ -38,8 +38,8 @@ struct FrameReport {
   double grid_cells = 0;     // fluid cells of the largest solve
   double contact_pairs = 0;  // segments that were looked at, two by two
   double contacts = 0;       // those that touched
-  double contact_depth = 0;  // largest overlap that the last pass found [m]
-  double crossings = 0;      // pairs that the last pass found passed through one another
+  double contact_depth = 0;  // largest overlap that the last pass left [m]
+  double crossings = 0;      // pairs that the last pass left through one another
 };
 
 // A strand that left the limits or is no longer finite.

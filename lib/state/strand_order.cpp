@@ -21,6 +21,10 @@ std::vector<std::int32_t> strands_by_root(const StrandModel<T>& model, const Str
         const T a = model.rest[layout.at(one, i, 3, c)], b = model.rest[layout.at(other, i, 3, c)];
         if (a != b) return a < b;
       }
+    for (int i = 0; !model.radius.empty() && i < std::min(layout.count(one), layout.count(other)); ++i) {
+      const T a = model.radius[layout.at(one, i, 1, 0)], b = model.radius[layout.at(other, i, 1, 0)];
+      if (a != b) return a < b;
+    }
     return layout.count(one) < layout.count(other);
   };
   std::sort(strands.begin(), strands.end(), comes_first);

@@ -72,8 +72,41 @@ TYPED_TEST(StandingCrossing, IsForgottenByNobodyWhoIsToldOfIt) {
   this->run_.contacts->copy_kept(&kept);
   this->run_.contacts =
       kernels::make_hair_contacts<TypeParam>(kernels::best_instruction_set(), {run_with_tbb, nullptr});
-  this->run_.contacts->keep(&kept, 1);
+  this->run_.contacts->begin(this->run_.contact_step());
+  EXPECT_TRUE(this->run_.contacts->keep(&kept, 1));
   EXPECT_GE(this->above_after(8), 2 * kRadius * (1 - 2e-2));
+}
+
+TYPED_TEST(StandingCrossing, IsKnownWhereItSlidesAfterwards) {
+  ASSERT_EQ(this->known(), 1);
+  this->shift(1, Vec3(0.01, 0, 0));  // to the next segment, with nobody to answer
+  this->above_after(0);
+  EXPECT_EQ(this->known(), 1);
+  this->above_after(16);
+  EXPECT_EQ(this->known(), 0);
+}
+
+// So near that the pair is found afresh too, with the side that it is on now.
+TYPED_TEST(StandingCrossing, IsPutBackHoweverShallow) {
+  for (const double reaches : {0.5, 1.0, 2.0})
+    for (const int passes : {7, 8}) {
+      const double above = this->run_.position(1, 2).y() - this->run_.position(0, 2).y();
+      this->run_.contacts->keep(nullptr, 0);
+      this->shift(1, Vec3(0, 0.001 - above, 0));  // over it, and then through
+      this->run_.remember();
+      this->shift(1, Vec3(0, -0.001 - reaches * 2 * kRadius, 0));
+      this->above_after(0);
+      ASSERT_EQ(this->known(), 1) << reaches;
+      EXPECT_GE(this->above_after(passes), 2 * kRadius * (1 - 2e-2)) << reaches << ", " << passes;
+      EXPECT_EQ(this->known(), 0) << reaches << ", " << passes;
+    }
+}
+
+TYPED_TEST(StandingCrossing, RefusesWhatNamesNoPair) {
+  std::uint64_t nothing = ~std::uint64_t{0};
+  EXPECT_FALSE(this->run_.contacts->keep(&nothing, 1));
+  nothing = 0;  // a segment with itself
+  EXPECT_FALSE(this->run_.contacts->keep(&nothing, 1));
 }
 
 TYPED_TEST(StandingCrossing, WithoutItHairStaysThrough) {

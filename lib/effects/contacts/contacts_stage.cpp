@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "core/error.h"
 #include "effects/lengths.h"
 #include "kernels/contact/hair_contacts.h"
 #include "state/strand_order.h"
@@ -94,7 +95,10 @@ class ContactsStage : public Stage<T> {
     if (found == snapshot.arrays.end()) return;
     std::vector<std::uint64_t> kept(found->second.size() / sizeof(std::uint64_t));
     std::memcpy(kept.data(), found->second.data(), kept.size() * sizeof kept[0]);
-    contacts_->keep(kept.data(), static_cast<std::int32_t>(kept.size()));
+    if (found->second.size() % sizeof kept[0] != 0 ||
+        !contacts_->keep(kept.data(), static_cast<std::int32_t>(kept.size())))
+      throw Error(ErrorKind::kInput, "state", "`contacts` names segments that are not there",
+                  "run without --resume");
   }
 
  private:
@@ -105,7 +109,6 @@ class ContactsStage : public Stage<T> {
   kernels::HairContactStep<T> contact_step() {
     kernels::HairContactStep<T> step{};
     step.batches = model_.view();
-    step.row_count = static_cast<std::int32_t>(model_.layout.rows());
     step.order = order_.data(), step.strands = static_cast<std::int32_t>(order_.size());
     step.state = state_.view();
     step.start = start_.data();

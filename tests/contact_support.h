@@ -5,7 +5,7 @@
 
 #include <vector>
 
-#include "kernels/launch/contacts.h"
+#include "kernels/launch/hair_contacts.h"
 #include "state/strand_order.h"
 
 namespace ringlet::kernels_testing {

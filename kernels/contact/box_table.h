@@ -1,9 +1,9 @@
 // Where to look for a segment's neighbours: a uniform spatial hash of boxes, in levels by size.
 //
 // Segments are cut into pieces, each with a box of its own, for what is long and thin fills its box badly. A
-// level takes boxes up to twice the size of the level before it, in cells half as wide along x, along which
-// cells lie one after the other in memory. Cells are numbered modulo a power of two along each axis, so that
-// a strand that was flung far away costs no memory. The table holds the boxes sorted by cell.
+// level takes boxes up to twice the size of the level before it, in cells that are narrower along x, along
+// which they lie one after the other in memory. Cells are numbered modulo a power of two along each axis, so
+// that a strand that was flung far away costs no memory. The table holds the boxes sorted by cell.
 #pragma once
 #include "kernels/contact/contact_data.h"
 
@@ -32,7 +32,7 @@ struct BoxLevels {
   BoxLevel level[kLevels];
   std::int32_t total_cells;
 
-  // Levels from the boxes' mean half size on, each with not many more cells than there are boxes.
+  // Levels from the boxes' mean half size on; few boxes have few cells.
   RINGLET_FUNCTION static BoxLevels make(const float* low, const float* high, float mean_half_size,
                                          std::int32_t boxes) {
     float most = 16;

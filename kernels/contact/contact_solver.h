@@ -26,7 +26,7 @@ class ContactSolver : public HairContacts<Scalar<R>> {
     settled_ = true;
     standing_.clear();
     if (pairs_.count == 0) return;
-    lay_out(step, kEndsOnly);
+    lay_out_end(step);
     standing_.find(backend_, pairs_, places());
     pairs_.count = 0;
   }
@@ -36,7 +36,7 @@ class ContactSolver : public HairContacts<Scalar<R>> {
     HairContactFigures figures;
     pairs_.count = 0;
     number_particles(step);
-    lay_out(step, kAll);
+    lay_out_start(step), lay_out_end(step);
     const std::int32_t found = neighbours_.find(backend_, places());
     pairs_.count = list_.make(backend_, neighbours_.a(), neighbours_.b(), found, standing_.keys(),
                               standing_.count(), particles_, kWidth);
@@ -47,7 +47,7 @@ class ContactSolver : public HairContacts<Scalar<R>> {
 
   std::int64_t pass(const HairContactStep<T>& step) override {
     if (pairs_.count == 0) return 0;
-    lay_out(step, kAll);
+    lay_out_end(step);
     const std::int64_t contacts = find();
     if (contacts == 0) return 0;
     answer(step);
@@ -57,7 +57,7 @@ class ContactSolver : public HairContacts<Scalar<R>> {
 
   void count_crossings(const HairContactStep<T>& step, HairContactFigures& figures) override {
     if (pairs_.count == 0) return;
-    lay_out(step, kAll);
+    lay_out_end(step);
     find();
     const unsigned char* active = active_.data();
     const ContactRecord<T>* record = record_.data();
@@ -76,8 +76,8 @@ class ContactSolver : public HairContacts<Scalar<R>> {
     const std::int32_t* strand = strand_.data();
     for (std::int32_t k = 0; k < count; ++k) {
       const std::int32_t a = key.a(kept[k]), b = key.b(kept[k]);
-      const bool there = kept[k] >> key.total_bits() == 0 && (kept[k] & 3) != PairKey::kFresh &&
-                         (kept[k] & 3) <= PairKey::kFresh && a < b && b < particles_;
+      const bool there =
+          kept[k] >> key.total_bits() == 0 && (kept[k] & 3) < PairKey::kFresh && a < b && b < particles_;
       if (!there || strand[a] < 0 || strand[b] < 0 || strand[a] == strand[b]) return false;
     }
     standing_.copy_from(kept, count), settled_ = true;
@@ -96,7 +96,6 @@ class ContactSolver : public HairContacts<Scalar<R>> {
   using Buffer = typename Backend::template Buffer<V>;
   static constexpr int kWidth = Traits<R>::kWidth;
   static constexpr int kPackChunk = 128, kStrandChunk = 64;
-  enum LaidOut { kEndsOnly, kAll };
 
   HairPlaces<T> places() const { return {start_.data(), end_.data(), strand_.data(), particles_}; }
   std::int32_t packs() const { return (pairs_.count + kWidth - 1) / kWidth; }
@@ -144,24 +143,39 @@ class ContactSolver : public HairContacts<Scalar<R>> {
     return {values[0], values[kLanes], values[2 * kLanes]};
   }
 
-  void lay_out(const HairContactStep<T>& step, LaidOut what) {
-    start_.resize(particles_), end_.resize(particles_), velocity_.resize(particles_);
-    Place<T>*start = start_.data(), *end = end_.data(), *velocity = velocity_.data();
+  void lay_out_start(const HairContactStep<T>& step) {
+    start_.resize(particles_);
+    Place<T>* start = start_.data();
     const std::int32_t* first = first_.data();
     backend_.parallel_for(
-        "lay out contacts", step.strands,
+        "lay out start", step.strands,
         [=] RINGLET_LAMBDA(std::int32_t s) {
           const StrandRows rows(step, s);
-          const Vector3<T> root = root_of(step, rows, step.root_points),
-                           start_root = root_of(step, rows, step.start_root_points);
+          const Vector3<T> root = root_of(step, rows, step.start_root_points);
+          std::int64_t at = rows.values;
+          for (std::int32_t p = first[s]; p < first[s + 1]; ++p, at += 3 * kLanes) {
+            const Vector3<T> then = root + value_at(step.start + at);
+            start[p] = {then.x, then.y, then.z, p - first[s] < step.clamped ? T(0) : T(1)};
+          }
+        },
+        kStrandChunk);
+  }
+
+  // Places and velocities as the state now has them.
+  void lay_out_end(const HairContactStep<T>& step) {
+    end_.resize(particles_), velocity_.resize(particles_);
+    Place<T>*end = end_.data(), *velocity = velocity_.data();
+    const std::int32_t* first = first_.data();
+    backend_.parallel_for(
+        "lay out end", step.strands,
+        [=] RINGLET_LAMBDA(std::int32_t s) {
+          const StrandRows rows(step, s);
+          const Vector3<T> root = root_of(step, rows, step.root_points);
           std::int64_t at = rows.values, scalar = rows.scalars;
           for (std::int32_t p = first[s]; p < first[s + 1]; ++p, at += 3 * kLanes, scalar += kLanes) {
-            const Vector3<T> now = root + value_at(step.state.position + at);
-            end[p] = {now.x, now.y, now.z, step.radius[scalar]};
-            if (what == kEndsOnly) continue;
-            const Vector3<T> then = start_root + value_at(step.start + at),
+            const Vector3<T> now = root + value_at(step.state.position + at),
                              v = value_at(step.state.velocity + at);
-            start[p] = {then.x, then.y, then.z, p - first[s] < step.clamped ? T(0) : T(1)};
+            end[p] = {now.x, now.y, now.z, step.radius[scalar]};
             velocity[p] = {v.x, v.y, v.z, T(0)};
           }
         },

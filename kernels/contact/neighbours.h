@@ -57,8 +57,8 @@ class Neighbours {
   static constexpr std::int32_t kFewNeighbours = 4;
   static constexpr int kSearchChunk = 4;  // groups
 
-  // Of one hair to the next, where most of the hair is [m]: counted in cells as wide as a segment is long,
-  // which far ones share.
+  // Of one hair to the next, where most of the hair is [m]: counted in cells twice as wide as a segment is
+  // long, which far ones share.
   float find_spacing(Backend& backend, const HairPlaces<T>& places, const HairExtent& extent) {
     constexpr std::int32_t kAcross = 64, kCells = kAcross * kAcross * kAcross;
     crowd_.resize(kCells);
@@ -88,10 +88,10 @@ class Neighbours {
 
   void search(Backend& backend, const HairPlaces<T>& places, SweptBoxes swept) {
     signed char* last_round = last_round_.data();
-    std::int32_t* meetings = meetings_.data();
+    const std::int32_t* meetings = meetings_.data();
     const Place<float>* carried = swept.carried;
     backend.parallel_for("all look", places.particles,
-                         [=] RINGLET_LAMBDA(std::int32_t p) { last_round[p] = 0, meetings[p] = 0; });
+                         [=] RINGLET_LAMBDA(std::int32_t p) { last_round[p] = 0; });
     for (int round = 0; round < kRounds; ++round) {
       swept.from_anywhere = round == 0;
       rounds_taken_ = round;
@@ -106,7 +106,6 @@ class Neighbours {
             (meetings[p] < kCrossing || meetings[p] % kCrossing < kFewNeighbours) &&
             (is_far(places, carried, p, farthest) || is_far(places, carried, p + 1, farthest));
         if (goes_on) last_round[p] = static_cast<signed char>(round + 1);
-        meetings[p] = 0;
       });
       swept.farthest = round + 2 < kRounds ? kFartherEachRound * swept.farthest : 3e18f;
     }
@@ -154,8 +153,7 @@ class Neighbours {
     }
   };
 
-  // Those of all rounds in one list, in the order of the tables. What the first found of two that went on the
-  // second found again.
+  // Those of all rounds in one list. What several found is there several times.
   std::int32_t gather_pairs(Backend& backend) {
     const std::int32_t limit = rank_limit(backend);
     std::int32_t groups = 0;

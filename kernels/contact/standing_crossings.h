@@ -92,6 +92,8 @@ class StandingCrossings {
           "standing", 1, 0, [=] RINGLET_LAMBDA(std::int32_t) { return static_cast<double>(*taken); }));
       if (count_ > room) key_.resize(count_), order_.resize(count_);
     } while (count_ > room);
+    std::uint32_t* order = order_.data();
+    backend.parallel_for("order standing", count_, [=] RINGLET_LAMBDA(std::int32_t k) { order[k] = 0; });
     backend.sort("sort standing", key_, order_, count_, key.total_bits());
   }
 

@@ -2,9 +2,9 @@
 // terms).
 #pragma once
 #include "kernels/grid/fluid.h"
+#include "kernels/grid/hair_grid.h"
 #include "kernels/grid/hair_shelter.h"
 #include "kernels/grid/pressure.h"
-#include "kernels/launch/hair_grid.h"
 
 namespace ringlet::kernels {
 

@@ -2,7 +2,7 @@
 #pragma once
 #include <memory>
 
-#include "kernels/launch/hair_grid.h"
+#include "kernels/grid/hair_grid.h"
 
 namespace ringlet::kernels {
 

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "kernels/launch/hair_grid.h"
+#include "kernels/grid/hair_grid.h"
 #include "kernels/solid/solid_view.h"
 #include "kernels/strand/length_step.h"
 #include "kernels/strand/strand_batch.h"

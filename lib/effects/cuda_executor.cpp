@@ -3,8 +3,8 @@
 #include "core/error.h"
 #include "effects/executor.h"
 #include "effects/host_threads.h"
-#include "kernels/launch/contacts.h"
 #include "kernels/launch/cuda_kernels.h"
+#include "kernels/launch/hair_contacts.h"
 #include "kernels/solid/response.h"
 
 namespace ringlet::effects {

@@ -6,7 +6,7 @@
 
 #include "core/error.h"
 #include "effects/host_threads.h"
-#include "kernels/launch/contacts.h"
+#include "kernels/launch/hair_contacts.h"
 #include "kernels/launch/hair_grid.h"
 #include "kernels/launch/launch.h"
 

@@ -1,6 +1,7 @@
 // The contacts stage: when it looks, from where on, what it tells, and that lengths are held after it.
 #include <gtest/gtest.h>
 
+#include "core/error.h"
 #include "effects/contacts/contacts_stage.h"
 #include "scene/scene_desc.h"
 #include "state/strand_model.h"
@@ -113,6 +114,34 @@ TEST_F(ContactsStage, WhatCrossedBeforeTheFrameStaysCrossed) {
   for (int k = 0; k < 8; ++k) stage_->run(*executor_, substep(k), report_);
   EXPECT_EQ(report_.contacts, 0);
   EXPECT_LT(above(), 0);
+}
+
+// A solid takes the upper strand through the lower after the frame's passes.
+TEST_F(ContactsStage, ACheckpointHoldsWhatIsThrough) {
+  make();
+  stage_->begin(*executor_, substep(0));
+  lower(0.0008);  // near, not yet touching
+  stage_->run(*executor_, substep(7), report_);
+  lower(0.004);
+  state::Snapshot snapshot;
+  stage_->save(snapshot);
+  ASSERT_EQ(snapshot.arrays.count("contacts"), 1u);
+
+  make();
+  stage_->restore(snapshot);
+  stage_->begin(*executor_, substep(0));
+  stage_->run(*executor_, substep(7), report_);
+  EXPECT_EQ(report_.contacts, 1);
+  EXPECT_GT(above(), 8e-5 * (1 - 1e-2));
+}
+
+TEST_F(ContactsStage, RefusesADamagedCheckpoint) {
+  make();
+  state::Snapshot snapshot;
+  snapshot.arrays["contacts"].assign(8, std::byte{0xff});
+  EXPECT_THROW(stage_->restore(snapshot), Error);
+  snapshot.arrays["contacts"].assign(5, std::byte{0});
+  EXPECT_THROW(stage_->restore(snapshot), Error);
 }
 
 TEST_F(ContactsStage, OwnsItsMemoryAndLaunchesForLengthsOnly) {

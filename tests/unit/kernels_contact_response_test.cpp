@@ -213,6 +213,13 @@ TYPED_TEST(ContactResponse, RootsAreObstaclesThatDoNotMove) {
   EXPECT_GT(run.position(1, 2).y(), 0);
 }
 
+TYPED_TEST(ContactResponse, HairWithoutSegmentsHasNone) {
+  HairRun<TypeParam> run({{{Vec3::Zero()}}, {{Vec3(0, 1e-5, 0)}}}, kRadius, 0);
+  this->fly(run);
+  EXPECT_EQ(this->one_pass(run).pairs, 0);
+  EXPECT_EQ(run.position(1, 0), Vec3(0, 1e-5, 0));
+}
+
 TYPED_TEST(ContactResponse, AStrandFarAwayChangesNothingHere) {
   const auto contacts_with = [&](const std::vector<HairStrand>& more) {
     auto strands = this->tangle(200);

@@ -8,7 +8,7 @@
 #include "core/log.h"
 #include "effects/grid/moving_axes.h"
 #include "effects/lengths.h"
-#include "kernels/launch/hair_grid.h"
+#include "kernels/grid/hair_grid.h"
 
 namespace ringlet::effects {
 namespace {

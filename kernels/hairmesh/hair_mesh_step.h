@@ -1,0 +1,316 @@
+// One step of a hair mesh: implicit Euler with prescribed roots and contacts (Baraff and Witkin 1998,
+// sections 3 and 5), collisions of external vertices, and the rest of the mesh taken along (hair mesh
+// paper, 3.2).
+#pragma once
+#include "kernels/hairmesh/deformation_minimisation.h"
+#include "kernels/hairmesh/filtered_conjugate_gradients.h"
+#include "kernels/hairmesh/hair_mesh_contact.h"
+#include "kernels/hairmesh/hair_mesh_forces.h"
+#include "kernels/hairmesh/hair_mesh_solver.h"
+
+namespace ringlet::kernels {
+inline namespace RINGLET_ISA {
+
+template <class E>
+class MeshElements {
+ public:
+  explicit MeshElements(MeshArray<E> elements) {
+    copy_values(buffer_, elements.data, static_cast<std::size_t>(elements.count));
+  }
+  const E* begin() const { return buffer_.data(); }
+  const E* end() const { return buffer_.data() + buffer_.size(); }
+  std::size_t bytes() const { return buffer_.bytes(); }
+
+ private:
+  HostBuffer<E> buffer_;
+};
+
+template <class T>
+class MeshStepper final : public HairMeshSolver<T> {
+ public:
+  explicit MeshStepper(const HairMeshView<T>& mesh)
+      : columns_(mesh.columns),
+        layers_(mesh.layers),
+        vertices_(mesh.columns * mesh.layers),
+        extrusion_springs_(mesh.extrusion_springs),
+        held_roots_(mesh.held_roots),
+        damping_(mesh.damping),
+        drag_(mesh.drag),
+        tolerance_(mesh.tolerance),
+        reach_(mesh.reach),
+        iterations_(mesh.iterations),
+        springs_(mesh.springs),
+        sheets_(mesh.sheets),
+        bends_(mesh.bends),
+        volumes_(mesh.volumes),
+        external_(mesh.external),
+        surface_({mesh.surface.data, 4 * mesh.surface.count}),
+        matrix_(mesh.pattern),
+        laplacian_(columns_, layers_, mesh.pattern.first_layer, mesh.degree, mesh.first_neighbour,
+                   mesh.neighbour),
+        filter_(columns_, layers_),
+        gradients_(vertices_) {
+    const auto count = static_cast<std::size_t>(vertices_);
+    copy_values(mass_, mesh.mass, count);
+    zero_values(4 * (count + kBeyond), position_, velocity_, impulse_, change_, displacement_);
+    zero_values(count, held_);
+    zero_values(count, contact_of_);
+    roots_.resize(4 * static_cast<std::size_t>(columns_));
+    contacts_.resize(count), carried_.resize(count), corrected_.resize(count);
+    for (std::int32_t v = 0; v < vertices_; ++v) position()[v] = padded(mesh.rest + 3 * v);
+  }
+
+  void set_state(const T* x, const T* v) override {
+    for (std::int32_t i = 0; i < vertices_; ++i)
+      position()[i] = padded(x + 3 * i), velocity()[i] = padded(v + 3 * i);
+    forget_contacts(), release_all(), corrected_count_ = 0;
+  }
+  void get_state(T* x, T* v) const override {
+    for (std::int32_t i = 0; i < vertices_; ++i)
+      store_three(x + 3 * i, position()[i]), store_three(v + 3 * i, velocity()[i]);
+  }
+
+  void assemble(const HairMeshStep<T>& step) override {
+    const T h = step.step;
+    step_ = h;
+    prescribe(step.roots);
+    StepSystem<T> system{step_factors(h, damping_), position(),      velocity(),
+                         vectors(impulse_),         matrix_.clear(), {}};
+    for (int k = 0; k < 3; ++k)
+      system.turn[k] = Padded<T>{step.rotation[k], step.rotation[3 + k], step.rotation[6 + k], 0};
+    const Padded<T> gravity = padded(step.gravity);
+    for (std::int32_t i = 0; i < vertices_; ++i) {
+      const T mass = mass_.data()[i];
+      const Padded<T> air = step.air != nullptr ? padded(step.air + 3 * i) : Padded<T>{};
+      vectors(impulse_)[i] = (h * mass) * (gravity + drag_ * (air - velocity()[i]));
+      matrix_.add_to_diagonal(i, mass * (T(1) + h * drag_));
+    }
+    for (const MeshSpring<T>& e : springs_) add_to<T>(system, e);
+    for (const MeshSheet<T>& e : sheets_) add_to<T>(system, e);
+    for (const MeshBend<T>& e : bends_) add_to<T>(system, e);
+    for (const MeshVolume<T>& e : volumes_) add_to<T>(system, e);
+  }
+
+  SolveFigures solve() override {
+    filter_.clear();
+    for (std::int32_t k = 0; k < contact_count_; ++k)
+      filter_.prescribe_along(contacts_.data()[k].vertex, padded(contacts_.data()[k].normal));
+    matrix_.factor(filter_);
+    const SolveFigures figures =
+        gradients_.solve(matrix_, filter_, tolerance_, iterations_, vectors(impulse_), vectors(change_));
+    for (std::int32_t i = 0; i < vertices_; ++i) velocity()[i] += vectors(change_)[i];
+    release_all();
+    for (std::int32_t k = 0; k < contact_count_; ++k) rub(contacts_.data()[k], carried_.data()[k]);
+    for (std::int32_t i = 0; i < vertices_; ++i) position()[i] += step_ * velocity()[i];
+    if (held_roots_)  // to the last bit
+      for (std::int32_t c = 0; c < columns_; ++c) position()[c * layers_] = vectors(roots_)[c];
+    forget_contacts(), corrected_count_ = 0;
+    return figures;
+  }
+
+  MeshContactFigures collide(const MeshSurface<T>& surface) override {
+    return collide_with([&](const T* point, T reach, MeshSurfacePoint<T>& found) {
+      return surface.find(surface.context, point, reach, found);
+    });
+  }
+  MeshContactFigures collide(const MeshEllipsoid<T>* ellipsoids, std::int32_t count) override {
+    MeshContactFigures all;
+    for (std::int32_t k = 0; k < count; ++k) {
+      const MeshContactFigures one = collide_with([&](const T* point, T reach, MeshSurfacePoint<T>& found) {
+        return find_on_ellipsoid(ellipsoids[k], point, reach, found);
+      });
+      all.touched += one.touched, all.corrected += one.corrected, all.depth = max(all.depth, one.depth);
+    }
+    return all;
+  }
+
+  SolveFigures minimise() override {
+    if (corrected_count_ == 0) return {};
+    filter_.clear();
+    for (std::int32_t k = 0; k < corrected_count_; ++k) filter_.prescribe_wholly(corrected_.data()[k]);
+    laplacian_.factor(filter_);
+    // From what the correction alone leaves; beside it the solve finds what the others do.
+    Padded<T>*u = vectors(displacement_), *left = vectors(impulse_), *w = vectors(change_);
+    gradients_.multiply(laplacian_, u, left);
+    for (std::int32_t i = 0; i < vertices_; ++i) left[i] = -left[i];
+    const SolveFigures figures = gradients_.solve(laplacian_, filter_, tolerance_, iterations_, left, w);
+    for (std::int32_t k = 0; k < corrected_count_; ++k) u[corrected_.data()[k]] = Padded<T>{};
+    const T per_step = T(1) / step_;
+    for (std::int32_t i = 0; i < vertices_; ++i) {
+      position()[i] += w[i], velocity()[i] += per_step * w[i];
+    }
+    corrected_count_ = 0;
+    return figures;
+  }
+
+  std::int32_t get_contacts(MeshContact<T>* contacts) const override {
+    for (std::int32_t k = 0; k < contact_count_; ++k) contacts[k] = contacts_.data()[k];
+    return contact_count_;
+  }
+  void set_contacts(const MeshContact<T>* contacts, std::int32_t count) override {
+    forget_contacts(), release_all();
+    for (std::int32_t k = 0; k < count; ++k) keep(contacts[k]);
+  }
+
+  MeshEnergies energies() const override {
+    MeshEnergies sums;
+    std::int32_t k = 0;
+    for (const MeshSpring<T>& e : springs_)
+      (k++ < extrusion_springs_ ? sums.stretch : sums.horizontal) += energy<T>(e, position());
+    for (const MeshSheet<T>& e : sheets_) sums.sheets += energy<T>(e, position());
+    for (const MeshBend<T>& e : bends_) sums.bend += energy<T>(e, position());
+    for (const MeshVolume<T>& e : volumes_) sums.volume += energy<T>(e, position());
+    for (std::int32_t i = 0; i < vertices_; ++i)
+      sums.kinetic += 0.5 * mass_.data()[i] * dot_product(velocity()[i], velocity()[i]);
+    return sums;
+  }
+
+  // Faces of four vertices are cut along one diagonal and the other, and the mean is taken.
+  double volume() const override {
+    double sixfold = 0;
+    for (const std::int32_t* face = surface_.begin(); face != surface_.end(); face += 4) {
+      if (face[3] < 0) {
+        sixfold += sixfold_volume(face[0], face[1], face[2]);
+        continue;
+      }
+      sixfold +=
+          0.5 * (sixfold_volume(face[0], face[1], face[2]) + sixfold_volume(face[0], face[2], face[3]) +
+                 sixfold_volume(face[1], face[2], face[3]) + sixfold_volume(face[1], face[3], face[0]));
+    }
+    return sixfold / 6;
+  }
+
+  std::size_t bytes() const override {
+    const std::size_t total = matrix_.bytes() + laplacian_.bytes() + gradients_.bytes() + springs_.bytes() +
+                              sheets_.bytes() + bends_.bytes() + volumes_.bytes() + external_.bytes() +
+                              surface_.bytes();
+    return total + mass_.bytes() + 5 * position_.bytes() + roots_.bytes() + filter_.bytes() +
+           corrected_.bytes() + held_.bytes() + contact_of_.bytes() + contacts_.bytes() + carried_.bytes();
+  }
+
+  const BlockMatrix<T>& matrix() const { return matrix_; }
+  const Padded<T>* impulse() const { return vectors(impulse_); }
+  const Padded<T>* change() const { return vectors(change_); }
+
+ private:
+  static Padded<T>* vectors(const HostBuffer<T>& buffer) {
+    return reinterpret_cast<Padded<T>*>(buffer.data());
+  }
+  Padded<T>* position() const { return vectors(position_); }
+  Padded<T>* velocity() const { return vectors(velocity_); }
+
+  // From the mesh's first vertex: far from the origin the terms would cancel.
+  double sixfold_volume(std::int32_t a, std::int32_t b, std::int32_t c) const {
+    const auto from = [&](std::int32_t v) {
+      Padded<double> d{};
+      for (int k = 0; k < 3; ++k) d[k] = double(position()[v][k]) - double(position()[0][k]);
+      return d;
+    };
+    return dot_product(from(a), cross_product(from(b), from(c)));
+  }
+
+  // Gives roots, and vertices in contact along their normals, the velocities that they have to have at the
+  // step's end (Baraff and Witkin's z): elements then see them, and the solve has to keep what is so
+  // prescribed.
+  void prescribe(const T* roots) {
+    const T per_step = T(1) / step_;
+    if (held_roots_)
+      for (std::int32_t c = 0; c < columns_; ++c) {
+        vectors(roots_)[c] = padded(roots + 3 * c);
+        velocity()[c * layers_] = per_step * (vectors(roots_)[c] - position()[c * layers_]);
+      }
+    for (std::int32_t k = 0; k < contact_count_; ++k) {
+      const MeshContact<T>& contact = contacts_.data()[k];
+      const Padded<T> n = padded(contact.normal);
+      const T change = dot_product(n, padded(contact.velocity) - velocity()[contact.vertex]);
+      velocity()[contact.vertex] += change * n;
+      carried_.data()[k] = change * mass_.data()[contact.vertex];
+    }
+  }
+
+  // What holding a vertex took, as an impulse along the normal, with that of `prescribe`: friction answers
+  // it, and a vertex that had to be held back, which no surface does, is let go.
+  void rub(const MeshContact<T>& contact, T carried) {
+    const std::int32_t i = contact.vertex;
+    const Padded<T> n = padded(contact.normal);
+    const T push = carried + dot_product(n, gradients_.product()[i] - vectors(impulse_)[i]);
+    held_.data()[i] = push > T(0);
+    if (!(push > T(0))) return;
+    const Padded<T> relative = velocity()[i] - padded(contact.velocity),
+                    tangential = relative - dot_product(n, relative) * n;
+    const T speed = sqrt(dot_product(tangential, tangential)),
+            lost = contact.friction * push / mass_.data()[i];
+    velocity()[i] -= (speed > lost ? lost / speed : T(1)) * tangential;
+  }
+
+  template <class Find>
+  MeshContactFigures collide_with(const Find& find) {
+    MeshContactFigures figures;
+    for (const std::int32_t i : external_) {
+      MeshSurfacePoint<T> found;
+      T point[3];
+      store_three(point, position()[i]);
+      if (!find(point, held_.data()[i] ? reach_ : T(0), found)) continue;
+      const Padded<T> n = padded(found.normal), out = padded(found.point) - position()[i];
+      const T depth = dot_product(n, out);
+      ++figures.touched;
+      if (depth > T(0)) {
+        ++figures.corrected, figures.depth = max(figures.depth, static_cast<double>(depth));
+        correct(i, out);
+      }
+      velocity()[i] = velocity_after_contact<T>(velocity()[i], padded(found.velocity), n, found.friction);
+      hold(i, found);
+    }
+    return figures;
+  }
+
+  void correct(std::int32_t i, Padded<T> out) {
+    Padded<T>& u = vectors(displacement_)[i];
+    const bool first = u[0] == 0 && u[1] == 0 && u[2] == 0;
+    if (first) corrected_.data()[corrected_count_++] = i;
+    position()[i] += out, u += out;
+  }
+
+  // The last surface that a vertex meets holds it.
+  void hold(std::int32_t i, const MeshSurfacePoint<T>& found) {
+    MeshContact<T> contact{i, {}, {}, found.friction};
+    for (int c = 0; c < 3; ++c) contact.normal[c] = found.normal[c], contact.velocity[c] = found.velocity[c];
+    keep(contact);
+  }
+  void keep(const MeshContact<T>& contact) {
+    std::int32_t& place = contact_of_.data()[contact.vertex];
+    if (place == 0) place = ++contact_count_;
+    contacts_.data()[place - 1] = contact;
+  }
+  void forget_contacts() {
+    for (std::int32_t k = 0; k < contact_count_; ++k) contact_of_.data()[contacts_.data()[k].vertex] = 0;
+    contact_count_ = 0;
+  }
+  void release_all() {
+    for (std::int32_t i = 0; i < vertices_; ++i) held_.data()[i] = 0;
+  }
+
+  std::int32_t columns_, layers_, vertices_, extrusion_springs_;
+  bool held_roots_;
+  T damping_, drag_, tolerance_, reach_, step_ = T(1);
+  std::int32_t iterations_;
+  MeshElements<MeshSpring<T>> springs_;
+  MeshElements<MeshSheet<T>> sheets_;
+  MeshElements<MeshBend<T>> bends_;
+  MeshElements<MeshVolume<T>> volumes_;
+  MeshElements<std::int32_t> external_, surface_;
+  BlockMatrix<T> matrix_;
+  MeshLaplacian<T> laplacian_;
+  VertexFilter<T> filter_;
+  FilteredConjugateGradients<T> gradients_;
+  HostBuffer<T> mass_, position_, velocity_, impulse_, change_, displacement_, roots_;
+  HostBuffer<std::int32_t> corrected_;   // since the last solve
+  HostBuffer<std::int32_t> contact_of_;  // [vertices] place in contacts_ plus 1; 0: none
+  HostBuffer<char> held_;                // pushed by a surface in the last solve
+  HostBuffer<MeshContact<T>> contacts_;
+  HostBuffer<T> carried_;  // impulses that gave contacts their surface's velocity [N s]
+  std::int32_t contact_count_ = 0, corrected_count_ = 0;
+};
+
+}  // namespace RINGLET_ISA
+}  // namespace ringlet::kernels

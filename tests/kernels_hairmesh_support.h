@@ -91,6 +91,23 @@ inline RestMesh prism_column(int corners, int layers, double side, double height
   return mesh;
 }
 
+// A lock of `wide` by `wide` quads that hangs from its roots at the origin.
+inline RestMesh hanging_lock(int wide, int layers, double side, double height) {
+  std::vector<ScalpFace> faces;
+  const int across = wide + 1;
+  for (int i = 0; i < wide; ++i)
+    for (int j = 0; j < wide; ++j)
+      faces.push_back({{i * across + j, (i + 1) * across + j, (i + 1) * across + j + 1, i * across + j + 1}});
+  RestMesh mesh{kernels::make_hair_mesh_topology(faces, across * across, layers), {}};
+  for (int i = 0; i < across; ++i)
+    for (int j = 0; j < across; ++j)
+      for (int l = 0; l < layers; ++l)
+        for (const double x :
+             {side * (i / double(wide) - 0.5), -height * l / (layers - 1), side * (j / double(wide) - 0.5)})
+          mesh.rest.push_back(x);
+  return mesh;
+}
+
 // A mesh that follows a head moving rigidly.
 template <class T>
 struct MeshRun {

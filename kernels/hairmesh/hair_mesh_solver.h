@@ -43,12 +43,15 @@ struct MeshEllipsoid {
   T friction;     // Coulomb mu [-]
 };
 
-// A vertex that a surface holds in the direction of its normal.
+// A vertex in contact: until the next step's end its surface holds it along the normal, or wholly where it
+// sticks.
 template <class T>
 struct MeshContact {
   std::int32_t vertex;
+  std::int32_t sticks;  // 1: friction holds it
   T normal[3];
   T velocity[3];  // of the surface there [m/s]
+  T force[3];     // of friction on one that slides, from the last step's push [N]
   T friction;     // Coulomb mu [-]
 };
 

@@ -52,11 +52,12 @@ class MeshStepper final : public HairMeshSolver<T> {
         gradients_(vertices_) {
     const auto count = static_cast<std::size_t>(vertices_);
     copy_values(mass_, mesh.mass, count);
-    zero_values(4 * (count + kBeyond), position_, velocity_, impulse_, change_, displacement_);
+    zero_values(4 * (count + kBeyond), position_, velocity_, impulse_, change_, displacement_, rubbing_,
+                carried_);
     zero_values(count, held_);
     zero_values(count, contact_of_);
     roots_.resize(4 * static_cast<std::size_t>(columns_));
-    contacts_.resize(count), carried_.resize(count), corrected_.resize(count);
+    contacts_.resize(count), corrected_.resize(count);
     for (std::int32_t v = 0; v < vertices_; ++v) position()[v] = padded(mesh.rest + 3 * v);
   }
 
@@ -85,6 +86,8 @@ class MeshStepper final : public HairMeshSolver<T> {
       vectors(impulse_)[i] = (h * mass) * (gravity + drag_ * (air - velocity()[i]));
       matrix_.add_to_diagonal(i, mass * (T(1) + h * drag_));
     }
+    for (std::int32_t k = 0; k < contact_count_; ++k)
+      vectors(impulse_)[contacts_.data()[k].vertex] += h * padded(contacts_.data()[k].force);
     for (const MeshSpring<T>& e : springs_) add_to<T>(system, e);
     for (const MeshSheet<T>& e : sheets_) add_to<T>(system, e);
     for (const MeshBend<T>& e : bends_) add_to<T>(system, e);
@@ -93,14 +96,19 @@ class MeshStepper final : public HairMeshSolver<T> {
 
   SolveFigures solve() override {
     filter_.clear();
-    for (std::int32_t k = 0; k < contact_count_; ++k)
-      filter_.prescribe_along(contacts_.data()[k].vertex, padded(contacts_.data()[k].normal));
+    for (std::int32_t k = 0; k < contact_count_; ++k) {
+      const MeshContact<T>& contact = contacts_.data()[k];
+      if (contact.sticks)
+        filter_.prescribe_wholly(contact.vertex);
+      else
+        filter_.prescribe_along(contact.vertex, padded(contact.normal));
+    }
     matrix_.factor(filter_);
     const SolveFigures figures =
         gradients_.solve(matrix_, filter_, tolerance_, iterations_, vectors(impulse_), vectors(change_));
     for (std::int32_t i = 0; i < vertices_; ++i) velocity()[i] += vectors(change_)[i];
     release_all();
-    for (std::int32_t k = 0; k < contact_count_; ++k) rub(contacts_.data()[k], carried_.data()[k]);
+    for (std::int32_t k = 0; k < contact_count_; ++k) rub(contacts_.data()[k], vectors(carried_)[k]);
     for (std::int32_t i = 0; i < vertices_; ++i) position()[i] += step_ * velocity()[i];
     if (held_roots_)  // to the last bit
       for (std::int32_t c = 0; c < columns_; ++c) position()[c * layers_] = vectors(roots_)[c];
@@ -184,8 +192,8 @@ class MeshStepper final : public HairMeshSolver<T> {
     const std::size_t total = matrix_.bytes() + laplacian_.bytes() + gradients_.bytes() + springs_.bytes() +
                               sheets_.bytes() + bends_.bytes() + volumes_.bytes() + external_.bytes() +
                               surface_.bytes();
-    return total + mass_.bytes() + 5 * position_.bytes() + roots_.bytes() + filter_.bytes() +
-           corrected_.bytes() + held_.bytes() + contact_of_.bytes() + contacts_.bytes() + carried_.bytes();
+    return total + mass_.bytes() + 7 * position_.bytes() + roots_.bytes() + filter_.bytes() +
+           corrected_.bytes() + held_.bytes() + contact_of_.bytes() + contacts_.bytes();
   }
 
   const BlockMatrix<T>& matrix() const { return matrix_; }
@@ -193,6 +201,8 @@ class MeshStepper final : public HairMeshSolver<T> {
   const Padded<T>* change() const { return vectors(change_); }
 
  private:
+  enum Held : char { kFree, kSlides, kSticks };
+
   static Padded<T>* vectors(const HostBuffer<T>& buffer) {
     return reinterpret_cast<Padded<T>*>(buffer.data());
   }
@@ -222,26 +232,41 @@ class MeshStepper final : public HairMeshSolver<T> {
     for (std::int32_t k = 0; k < contact_count_; ++k) {
       const MeshContact<T>& contact = contacts_.data()[k];
       const Padded<T> n = padded(contact.normal);
-      const T change = dot_product(n, padded(contact.velocity) - velocity()[contact.vertex]);
-      velocity()[contact.vertex] += change * n;
-      carried_.data()[k] = change * mass_.data()[contact.vertex];
+      Padded<T> change = padded(contact.velocity) - velocity()[contact.vertex];
+      if (!contact.sticks) change = dot_product(n, change) * n;
+      velocity()[contact.vertex] += change;
+      vectors(carried_)[k] = mass_.data()[contact.vertex] * change;
     }
   }
 
-  // What holding a vertex took, as an impulse along the normal, with that of `prescribe`: friction answers
-  // it, and a vertex that had to be held back, which no surface does, is let go.
-  void rub(const MeshContact<T>& contact, T carried) {
+  // What holding a vertex took, as an impulse, with that of `prescribe`. One that had to be held back, which
+  // no surface does, is let go. One that sticks slides when that took more than Coulomb's cone allows, and
+  // from then on has the cone's force against its motion; until the force would turn its motion, when it
+  // sticks.
+  void rub(const MeshContact<T>& contact, Padded<T> carried) {
     const std::int32_t i = contact.vertex;
-    const Padded<T> n = padded(contact.normal);
-    const T push = carried + dot_product(n, gradients_.product()[i] - vectors(impulse_)[i]);
-    held_.data()[i] = push > T(0);
+    const Padded<T> n = padded(contact.normal),
+                    held = carried + (gradients_.product()[i] - vectors(impulse_)[i]);
+    const T push = dot_product(n, held);
+    held_.data()[i] = kFree;
     if (!(push > T(0))) return;
-    const Padded<T> relative = velocity()[i] - padded(contact.velocity),
-                    tangential = relative - dot_product(n, relative) * n;
-    const T speed = sqrt(dot_product(tangential, tangential)),
-            lost = contact.friction * push / mass_.data()[i];
-    velocity()[i] -= (speed > lost ? lost / speed : T(1)) * tangential;
+    Padded<T> direction;  // of friction
+    if (contact.sticks) {
+      direction = held - push * n;
+      held_.data()[i] =
+          square(direction) <= contact.friction * contact.friction * push * push ? kSticks : kSlides;
+    } else {
+      const Padded<T> relative = velocity()[i] - padded(contact.velocity);
+      direction = dot_product(n, relative) * n - relative;
+      held_.data()[i] = dot_product(direction, padded(contact.force)) < T(0) ? kSticks : kSlides;
+      if (held_.data()[i] == kSticks) velocity()[i] += direction;
+    }
+    const T size = sqrt(square(direction));
+    const T scale =
+        held_.data()[i] == kSlides && size > T(0) ? contact.friction * push / (size * step_) : T(0);
+    vectors(rubbing_)[i] = scale * direction;
   }
+  static RINGLET_KERNEL T square(Padded<T> a) { return dot_product(a, a); }
 
   template <class Find>
   MeshContactFigures collide_with(const Find& find) {
@@ -250,7 +275,7 @@ class MeshStepper final : public HairMeshSolver<T> {
       MeshSurfacePoint<T> found;
       T point[3];
       store_three(point, position()[i]);
-      if (!find(point, held_.data()[i] ? reach_ : T(0), found)) continue;
+      if (!find(point, held_.data()[i] != kFree ? reach_ : T(0), found)) continue;
       const Padded<T> n = padded(found.normal), out = padded(found.point) - position()[i];
       const T depth = dot_product(n, out);
       ++figures.touched;
@@ -273,8 +298,12 @@ class MeshStepper final : public HairMeshSolver<T> {
 
   // The last surface that a vertex meets holds it.
   void hold(std::int32_t i, const MeshSurfacePoint<T>& found) {
-    MeshContact<T> contact{i, {}, {}, found.friction};
+    MeshContact<T> contact{i, held_.data()[i] == kSticks, {}, {}, {}, found.friction};
     for (int c = 0; c < 3; ++c) contact.normal[c] = found.normal[c], contact.velocity[c] = found.velocity[c];
+    if (held_.data()[i] == kSlides) store_three(contact.force, vectors(rubbing_)[i]);
+    // Friction stopped one that has come anew.
+    if (held_.data()[i] == kFree)
+      contact.sticks = found.friction > T(0) && square(velocity()[i] - padded(found.velocity)) == T(0);
     keep(contact);
   }
   void keep(const MeshContact<T>& contact) {
@@ -287,7 +316,7 @@ class MeshStepper final : public HairMeshSolver<T> {
     contact_count_ = 0;
   }
   void release_all() {
-    for (std::int32_t i = 0; i < vertices_; ++i) held_.data()[i] = 0;
+    for (std::int32_t i = 0; i < vertices_; ++i) held_.data()[i] = kFree;
   }
 
   std::int32_t columns_, layers_, vertices_, extrusion_springs_;
@@ -306,9 +335,10 @@ class MeshStepper final : public HairMeshSolver<T> {
   HostBuffer<T> mass_, position_, velocity_, impulse_, change_, displacement_, roots_;
   HostBuffer<std::int32_t> corrected_;   // since the last solve
   HostBuffer<std::int32_t> contact_of_;  // [vertices] place in contacts_ plus 1; 0: none
-  HostBuffer<char> held_;                // pushed by a surface in the last solve
+  HostBuffer<char> held_;                // how a surface that pushed it held a vertex in the last solve
   HostBuffer<MeshContact<T>> contacts_;
   HostBuffer<T> carried_;  // impulses that gave contacts their surface's velocity [N s]
+  HostBuffer<T> rubbing_;  // [vertices] friction on those that slide [N]
   std::int32_t contact_count_ = 0, corrected_count_ = 0;
 };
 

@@ -19,7 +19,7 @@ struct HairMeshParameters {
   double bend = 0.05;              // of columns [Pa m^2]
   double bend_across = 0.02;       // of the layers' surfaces [Pa m^2]
   double volume = 300;             // of the corner tetrahedra, relative to the rest volume [Pa]
-  double damping = 0.02;           // of each condition's rate, relative to its stiffness [s]
+  double damping = 0.005;          // of each condition's rate, relative to its stiffness [s]
   double drag = 0.5;               // of the air, per mass [1/s]
   bool held_roots = true;          // false: nothing holds the mesh
   double tolerance = 1e-4;         // relative residual of the solves

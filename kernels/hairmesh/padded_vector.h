@@ -112,10 +112,6 @@ template <class T>
 RINGLET_KERNEL Padded<T> second_half(typename Octet<T>::Vector a) {
   return __builtin_shufflevector(a, a, 4, 5, 6, 7);
 }
-template <class T>
-RINGLET_KERNEL Padded<T> sum_of_halves(typename Octet<T>::Vector a) {
-  return __builtin_shufflevector(a, a, 0, 1, 2, 3) + __builtin_shufflevector(a, a, 4, 5, 6, 7);
-}
 
 }  // namespace RINGLET_ISA
 }  // namespace ringlet::kernels

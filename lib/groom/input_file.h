@@ -19,6 +19,7 @@ class InputFile {
   const std::filesystem::path& path() const { return path_; }
   std::uint64_t size() const { return bytes_.size(); }
   bool starts_with(std::string_view magic) const;
+  std::string_view text() const { return {bytes_.data(), bytes_.size()}; }
 
   // The little-endian value at a byte offset; `what` names it where the file ends before it.
   template <class T>

@@ -5,6 +5,7 @@
 
 #include "core/error.h"
 #include "core/log.h"
+#include "groom/file_units.h"
 #include "groom/formats.h"
 #include "groom/groom.h"
 #include "groom/up_axis.h"
@@ -63,21 +64,6 @@ std::optional<std::filesystem::path> skin_of(const std::filesystem::path& file,
   return beside;
 }
 
-// The scene's word goes before the file's, the file's before the scene's default.
-scene::Units units_of(const std::string& file, const scene::UnitsOverride& asked,
-                      const scene::UnitsOverride& declared, const scene::Units& scene_units) {
-  const auto choose = [&](const auto& asked_one, const auto& declared_one, auto fallback, const char* what) {
-    if (asked_one && declared_one && *asked_one != *declared_one) {
-      log_info(fmt::format("{}: the scene's {} goes before the file's own", file, what));
-    } else if (!asked_one && declared_one && *declared_one != fallback) {
-      log_info(fmt::format("{}: the file's own {} is obeyed, not the scene's", file, what));
-    }
-    return asked_one.value_or(declared_one.value_or(fallback));
-  };
-  return {choose(asked.metres_per_unit, declared.metres_per_unit, scene_units.metres_per_unit, "length unit"),
-          choose(asked.up, declared.up, scene_units.up, "up axis")};
-}
-
 void convert(Strands& strands, const scene::Units& from, scene::Axis up, const std::string& file) {
   const Mat3 turn = up_rotation(from.up, up);
   for (Vec3& point : strands.points) point = turn * (point * from.metres_per_unit);
@@ -93,7 +79,7 @@ void convert(Strands& strands, const scene::Units& from, scene::Axis up, const s
 Strands read(const std::filesystem::path& file, const std::optional<std::filesystem::path>& skin,
              const scene::UnitsOverride& units, const scene::Units& scene_units) {
   FileGroom groom = read_file(file);
-  convert(groom.strands, units_of(file.string(), units, groom.declared, scene_units), scene_units.up,
+  convert(groom.strands, file_units(file.string(), units, groom.declared, scene_units), scene_units.up,
           file.string());
   if (const auto skin_file = skin_of(file, skin)) {
     groom.strands.roots = read_tressfx_skin(InputFile(*skin_file), groom.strands.size());

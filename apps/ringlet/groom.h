@@ -1,9 +1,11 @@
-// ringlet groom grow|convert|trim|lengthen|comb|resample|rest
+// ringlet groom grow|hair-mesh|convert|trim|lengthen|comb|resample|rest
 #pragma once
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "groom/extrude_hair_mesh.h"
 
 namespace ringlet::app {
 
@@ -52,10 +54,27 @@ struct GroomResampleOptions {  // one of particles and step is given
   std::optional<double> step;
 };
 
+// Lengths and places are in the unit and axes given. What is left out is the style's where there is one.
+struct GroomHairMeshOptions {
+  std::filesystem::path head, output;  // .json or .obj
+  std::optional<std::string> unit;  // empty: what the head's file declares, and metres for lengths given here
+  std::string up = "y";
+  std::optional<groom::HairStyle> style;
+  groom::HairResolution resolution = groom::HairResolution::kLow;
+  std::optional<std::string> mesh;                 // of the head's meshes, that is the scalp
+  std::vector<double> box, centre, pole, forward;  // empty: not given
+  std::optional<double> angle;                     // [degrees] from the pole to the rim
+  std::optional<int> vertices, layers;             // of one layer; layers
+  std::optional<double> length, lift, level, curl_radius, curl_turns, gravity, comb;
+};
+
 struct GroomRestOptions {
   std::filesystem::path cache, output;
   int frame = 0;
 };
+
+// Writes a hair mesh and says what it holds. Returns 0. Throws Error; then nothing is written.
+int run_groom_hair_mesh(const GroomHairMeshOptions& options);
 
 // Each writes a Ringlet groom (.h5) and says what it holds. Returns 0. Throws Error; then nothing is written.
 int run_groom_grow(const GroomGrowOptions& options);

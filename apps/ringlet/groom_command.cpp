@@ -42,6 +42,85 @@ void add_grow(CLI::App& group, Job& job) {
   add_output(command, options->output);
 }
 
+void add_scalp_region(CLI::App& command, GroomHairMeshOptions& options) {
+  command.add_option("--mesh", options.mesh, "the mesh of the head's file that is the scalp")
+      ->option_text("NAME");
+  command.add_option("--box", options.box, "two corners: only what lies in the box is scalp")
+      ->expected(6)
+      ->option_text("AX AY AZ BX BY BZ");
+  command
+      .add_option("--center", options.centre,
+                  "a place inside the head, that of a sphere fitted to the scalp by default")
+      ->expected(3)
+      ->option_text("X Y Z");
+  command
+      .add_option("--pole", options.pole,
+                  "the direction from there to the scalp's middle, by default its mean")
+      ->expected(3)
+      ->option_text("X Y Z");
+  command
+      .add_option("--angle", options.angle,
+                  "from the pole to the rim [degrees]; by default as far as the scalp goes")
+      ->option_text("DEGREES");
+  command.add_option("--forward", options.forward, "where the face looks; z by default where y is up")
+      ->expected(3)
+      ->option_text("X Y Z");
+}
+
+void add_extrusion(CLI::App& command, GroomHairMeshOptions& options) {
+  command.add_option("--vertices", options.vertices, "of one layer; 91 by default")->option_text("N");
+  command.add_option("--layers", options.layers, "the scalp's included; 5 by default")->option_text("N");
+  command.add_option("--length", options.length, "of the hair")->option_text("LENGTH");
+  command
+      .add_option("--level", options.level,
+                  "height along the up axis at which hair is cut; by default it is not")
+      ->option_text("HEIGHT");
+  command.add_option("--lift", options.lift, "how far hair stands off before it lies down; 0 by default")
+      ->option_text("LENGTH");
+  command
+      .add_option("--gravity", options.gravity,
+                  "how sharply hair bends: 0 straight out of the head; 1 by default")
+      ->option_text("G");
+  command.add_option("--comb", options.comb, "how strongly hair is combed back; 3 by default")
+      ->option_text("C");
+  command.add_option("--curl-radius", options.curl_radius, "of a helix at the tips; 0 by default")
+      ->option_text("LENGTH");
+  command.add_option("--curl-turns", options.curl_turns, "of it from root to tip; 0 by default")
+      ->option_text("N");
+}
+
+void add_hair_mesh(CLI::App& group, Job& job) {
+  CLI::App& command = *group.add_subcommand("hair-mesh", "extrude a hair mesh from a head's scalp");
+  const auto options = add_job(command, job, run_groom_hair_mesh);
+  command.add_option("HEAD", options->head, "mesh file of the head, in its rest pose")->required();
+  command.add_option("-o,--output", options->output, "hair mesh to write (.json or .obj)")
+      ->required()
+      ->option_text("FILE");
+  command
+      .add_option(
+          "--unit", options->unit,
+          "of the head, whatever its file declares, and of all lengths given here; by default what the "
+          "file declares, and metres")
+      ->option_text("UNIT");
+  command
+      .add_option("--up", options->up,
+                  "up axis of what is written and of all places given here; y by default")
+      ->option_text("x/y/z");
+  using groom::HairResolution, groom::HairStyle;
+  const std::map<std::string, HairStyle> styles = {
+      {"short", HairStyle::kShort}, {"shoulder", HairStyle::kShoulder}, {"long", HairStyle::kLong}};
+  command.add_option("--style", options->style, "in proportion to the head; other options go before it")
+      ->transform(CLI::CheckedTransformer(styles))
+      ->option_text("short/shoulder/long");
+  const std::map<std::string, HairResolution> resolutions = {
+      {"low", HairResolution::kLow}, {"medium", HairResolution::kMedium}, {"high", HairResolution::kHigh}};
+  command.add_option("--resolution", options->resolution, "of the style; low by default")
+      ->transform(CLI::CheckedTransformer(resolutions))
+      ->option_text("low/medium/high");
+  add_scalp_region(command, *options);
+  add_extrusion(command, *options);
+}
+
 void add_convert(CLI::App& group, Job& job) {
   CLI::App& command = *group.add_subcommand("convert", "read any groom and write it as Ringlet's own");
   add_files(command, *add_job(command, job, run_groom_convert));
@@ -122,6 +201,7 @@ void add_groom(CLI::App& app, Job& job) {
   CLI::App& group = *app.add_subcommand("groom", "grow, convert and edit grooms");
   group.require_subcommand(1);
   add_grow(group, job);
+  add_hair_mesh(group, job);
   add_convert(group, job);
   add_trim(group, job);
   add_lengthen(group, job);

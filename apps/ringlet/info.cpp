@@ -8,6 +8,7 @@
 #include "cache/reader.h"
 #include "core/error.h"
 #include "groom/groom.h"
+#include "groom/hair_mesh.h"
 #include "groom/measure.h"
 #include "report.h"
 #include "scene/scene.h"
@@ -200,6 +201,10 @@ Report describe_cache_file(const InfoOptions& options) {
 
 constexpr scene::Units kMetres{1, scene::Axis::kY};
 
+const char* axis_name(scene::Axis axis) {
+  return axis == scene::Axis::kX ? "x" : axis == scene::Axis::kY ? "y" : "z";
+}
+
 // Those of a summary's figures that are asked for; null where there was nothing to measure.
 Report figures_of(const std::optional<groom::Summary>& summary,
                   const std::vector<std::pair<const char*, double groom::Summary::*>>& figures) {
@@ -239,13 +244,39 @@ Report describe_groom(const InfoOptions& options) {
   report["units"] = {{"length", declares ? "m" : "the file's own: its format declares none"},
                      {"curvature", "1/" + unit},
                      {"root_density", "roots/" + unit + "^2"}};
-  if (declares)
-    report["units"]["up"] = units.up == scene::Axis::kX ? "x" : units.up == scene::Axis::kY ? "y" : "z";
+  if (declares) report["units"]["up"] = axis_name(units.up);
   report.update(measures_of(strands));
   report["widths"] = !strands.widths.empty();
   report["stored_roots"] = !strands.roots.empty();
   report["bounds"] = bounds(strands.points.size(), at);
   if (options.strand) report["strand"] = strand_points(options, strands.offsets, at);
+  return report;
+}
+
+Report describe_hair_mesh(const InfoOptions& options) {
+  refuse_strand(options);
+  scene::Units units = kMetres;
+  units.up = groom::declared_hair_mesh_units(options.file).up.value_or(units.up);
+  const groom::HairMesh mesh = groom::read_hair_mesh(options.file, {}, units);
+  const auto is_triangle = [](const groom::HairMesh::Face& face) {
+    return groom::HairMesh::corners(face) == 3;
+  };
+  const auto triangles = std::count_if(mesh.faces.begin(), mesh.faces.end(), is_triangle);
+  double area = 0;
+  for (std::size_t f = 0; f < mesh.faces.size(); ++f) area += groom::scalp_area(mesh, f);
+  Report report = {{"kind", "hair mesh"}};
+  report["scalp_faces"] = {{"count", mesh.faces.size()},
+                           {"triangles", triangles},
+                           {"quads", static_cast<std::int64_t>(mesh.faces.size()) - triangles}};
+  report["layers"] = mesh.layers;
+  report["vertices"] = mesh.positions.size();
+  report["vertices_per_layer"] = mesh.vertices();
+  report["prisms"] = mesh.prisms();
+  report["groups"] = strand_counts(mesh.groups, mesh.group_names);
+  report["units"] = {{"length", "m"}, {"up", axis_name(units.up)}};
+  report["scalp_area"] = number(area);
+  report["volume"] = number(groom::volume(mesh));
+  report["bounds"] = bounds(mesh.positions.size(), [&](std::size_t i) { return mesh.positions[i]; });
   return report;
 }
 
@@ -301,6 +332,11 @@ bool is_groom(const fs::path& file, const std::string& format) {
   return format == "ringlet-groom" || kExtensions.contains(file.extension().string());
 }
 
+// Only files that may be one are read for it.
+bool is_hair_mesh(const fs::path& file) {
+  return (file.extension() == ".json" || file.extension() == ".obj") && groom::is_hair_mesh(file);
+}
+
 Report describe(const InfoOptions& options) {
   const fs::path& file = options.file;
   std::error_code error;
@@ -310,6 +346,7 @@ Report describe(const InfoOptions& options) {
   if (format == "ringlet-cache") return describe_cache_file(options);
   if (is_groom(file, format)) return describe_groom(options);
   if (file.extension() == ".h5") return describe_cache(options);  // which says what is wrong with it
+  if (is_hair_mesh(file)) return describe_hair_mesh(options);
   return file.extension() == ".json" ? describe_scene(options) : describe_mesh(options);
 }
 

@@ -4,8 +4,8 @@
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
-#include "core/error.h"
 #include "effects/host_threads.h"
+#include "effects/instruction_set.h"
 #include "kernels/launch/hair_contacts.h"
 #include "kernels/launch/hair_grid.h"
 #include "kernels/launch/launch.h"
@@ -14,15 +14,6 @@ namespace ringlet::effects {
 namespace {
 
 using kernels::InstructionSet;
-
-InstructionSet choose(const std::string& name) {
-  const InstructionSet best = kernels::best_instruction_set();
-  if (name.empty()) return best;
-  for (const InstructionSet set : {InstructionSet::kGeneric, InstructionSet::kAvx2, InstructionSet::kAvx512})
-    if (set <= best && name == kernels::name_of(set)) return set;
-  throw Error(ErrorKind::kUsage, "", "this processor has no instruction set `" + name + "`",
-              std::string("its widest is ") + kernels::name_of(best));
-}
 
 // Strands are independent: batches in any order on any thread give the same bits.
 template <class T>
@@ -72,7 +63,7 @@ class CpuExecutor : public Executor<T> {
 template <class T>
 std::unique_ptr<Executor<T>> make_cpu_executor(const state::StrandModel<T>& model,
                                                const std::string& instruction_set) {
-  return std::make_unique<CpuExecutor<T>>(model, choose(instruction_set));
+  return std::make_unique<CpuExecutor<T>>(model, choose_instruction_set(instruction_set));
 }
 
 template std::unique_ptr<Executor<float>> make_cpu_executor(const state::StrandModel<float>&,

@@ -5,6 +5,7 @@
 #include "core/error.h"
 #include "core/log.h"
 #include "groom/groom.h"
+#include "groom/hair_mesh_strands.h"
 
 namespace ringlet::groom {
 
@@ -42,10 +43,25 @@ Strands grow_scene_groom(const scene::Groom& desc, const scene::Units& scene_uni
     throw Error(error.kind(), std::move(problems));
   }
 }
+
+HairMeshStrandsDesc strands_desc(const scene::Groom& desc) {
+  const scene::HairMeshStrands& from = *desc.hair_mesh;
+  return {from.strands,     from.density,    from.particles, from.seed,       desc.width,
+          from.curl_radius, from.curl_turns, from.noise,     from.noise_waves};
+}
 }  // namespace
+
+HairMesh read_scene_hair_mesh(const scene::Groom& desc, const scene::Units& scene_units) {
+  return read_hair_mesh(desc.hair_mesh->file, desc.units, scene_units);
+}
+
+HairMeshStrands scene_strands(const scene::Groom& desc, const HairMesh& mesh) {
+  return {mesh, strands_desc(desc), desc.pointer + "/hair_mesh"};
+}
 
 Strands build(const scene::Groom& desc, const scene::Units& scene_units, const Scalp* scalp) {
   if (desc.grow) return grow_scene_groom(desc, scene_units, scalp);
+  if (desc.hair_mesh) return scene_strands(desc, read_scene_hair_mesh(desc, scene_units)).strands();
   std::vector<std::filesystem::path> files = {desc.file.value()};
   files.insert(files.end(), desc.more.begin(), desc.more.end());
   Strands all;

@@ -160,6 +160,15 @@ void add_strands(const scene::Scene& scene, const World& world, const Simulated<
   world.interpolation().blend(simulated.elongations(), frame.elongation);
 }
 
+void add_surfaces(const scene::Scene& scene, const World& world, state::Frame& frame) {
+  if (!asks_for(scene, "solids")) return;
+  for (const solids::AnimatedMesh* mesh : world.shown) {
+    std::vector<Vec3> vertices(mesh->vertex_count());
+    mesh->sample(frame.time, vertices);
+    frame.surface_vertices.push_back(in_units(vertices, scene.units.metres_per_unit));
+  }
+}
+
 }  // namespace
 
 std::int64_t strand_in_cache(const World& world, std::int64_t simulated) {
@@ -211,12 +220,18 @@ state::Frame make_frame(const scene::Scene& scene, const World& world, const sta
     for (std::size_t s = 0; s < model.layout.strands(); ++s)
       frame.living[strand_in_cache(world, static_cast<std::int64_t>(s))] = model.living(s);
   }
-  if (!asks_for(scene, "solids")) return frame;
-  for (const solids::AnimatedMesh* mesh : world.shown) {
-    std::vector<Vec3> vertices(mesh->vertex_count());
-    mesh->sample(frame.time, vertices);
-    frame.surface_vertices.push_back(in_units(vertices, scene.units.metres_per_unit));
-  }
+  add_surfaces(scene, world, frame);
+  return frame;
+}
+
+state::Frame make_frame(const scene::Scene& scene, const World& world, std::span<const Vec3> positions,
+                        std::span<const Vec3> velocities, int number, double time) {
+  state::Frame frame;
+  frame.number = number;
+  frame.time = time;
+  frame.position = in_units(positions, scene.units.metres_per_unit);
+  if (asks_for(scene, "velocity")) frame.velocity = in_units(velocities, scene.units.metres_per_unit);
+  add_surfaces(scene, world, frame);
   return frame;
 }
 

@@ -1,5 +1,7 @@
 // What a run hands on: its header, and frames as the scene's cache asks for them.
 #pragma once
+#include <span>
+
 #include "pipeline/world.h"
 #include "state/frame.h"
 #include "state/strand_model.h"
@@ -14,6 +16,10 @@ state::RunHeader make_header(const scene::Scene& scene, const World& world);
 template <class T>
 state::Frame make_frame(const scene::Scene& scene, const World& world, const state::StrandModel<T>& model,
                         const state::StrandState<T>& state, int number, double time);
+
+// The same of strands that something else than a strand model places: [particles] in the world [m], [m/s].
+state::Frame make_frame(const scene::Scene& scene, const World& world, std::span<const Vec3> positions,
+                        std::span<const Vec3> velocities, int number, double time);
 
 // The strand of the cache that a simulated one is.
 std::int64_t strand_in_cache(const World& world, std::int64_t simulated);

@@ -17,6 +17,7 @@
 #include "effects/wind/wind_stage.h"
 #include "pipeline/checkpoint.h"
 #include "pipeline/frames.h"
+#include "pipeline/hair_mesh_simulation.h"
 #include "pipeline/report.h"
 #include "pipeline/world.h"
 
@@ -394,6 +395,7 @@ bool TypedSimulation<T>::run(const FrameRange& range, state::FrameSink& sink, co
 }  // namespace
 
 std::unique_ptr<Simulation> Simulation::create(const scene::Scene& scene, const Options& options) {
+  if (scene.model.type == scene::ModelType::kHairMesh) return make_hair_mesh_simulation(scene, options);
   if (options.precision == Precision::kDouble && options.backend == Backend::kCuda)
     throw Error(ErrorKind::kUsage, "--precision", "the CUDA backend steps in single precision only",
                 "use --backend cpu for double");

@@ -17,11 +17,11 @@ namespace ringlet::pipeline {
 
 double first_time(const scene::Frames& frames) { return -frames.preroll / frames.fps; }
 
-namespace {
-
 groom::Scalp scalp_of(const solids::AnimatedMesh& head) {
   return {head.rest_vertices(), head.triangles(), head.mesh_of_triangle(), head.mesh_names()};
 }
+
+namespace {
 
 void build_solids(const scene::Scene& scene, World& world) {
   if (world.head) world.shown.push_back(world.head.get()), world.shown_names.push_back("head");
@@ -105,7 +105,8 @@ std::vector<std::int32_t> find_skin(const scene::Scene& scene, const World& worl
 // Moves what starts inside the head out of it, in the rest shape; says how much that was.
 void clear_head(const scene::Scene& scene, const scene::Groom& desc, World& world, Held& held) {
   auto& [strands, attachment, skin, guides] = held;
-  if (world.skin.home < 0) {
+  // A hair mesh's strands are where the mesh puts them.
+  if (world.skin.home < 0 || scene.model.type == scene::ModelType::kHairMesh) {
     skin.assign(strands.size(), kernels::kNoSkin);
     return;
   }

@@ -50,6 +50,9 @@ struct World {
 // Reads and builds all assets. Throws Error{kInput}.
 World build_world(const scene::Scene& scene);
 
+// The head as growth and attachment see it.
+groom::Scalp scalp_of(const solids::AnimatedMesh& head);
+
 // The run's first time: minus the preroll [s].
 double first_time(const scene::Frames& frames);
 

@@ -30,6 +30,10 @@ Axis axis(const Json& value) {
   return word<Axis>(value, {{"x", Axis::kX}, {"y", Axis::kY}, {"z", Axis::kZ}});
 }
 
+Quat rotation(const Json& q) {
+  return Quat(q[3].get<double>(), q[0].get<double>(), q[1].get<double>(), q[2].get<double>()).normalized();
+}
+
 class Builder {
  public:
   Builder(const Json& document, const fs::path& file) : document_(document), file_(file) {}
@@ -83,10 +87,8 @@ class Builder {
   static std::vector<Key> keys(const Json& list) {
     std::vector<Key> keys;
     for (const Json& key : list) {
-      const Json& q = key["rotate"];
-      const Quat rotate =
-          Quat(q[3].get<double>(), q[0].get<double>(), q[1].get<double>(), q[2].get<double>()).normalized();
-      keys.push_back({key["frame"], vec3(key["translate"]), rotate, key.value("scale", 1.0)});
+      keys.push_back(
+          {key["frame"], vec3(key["translate"]), rotation(key["rotate"]), key.value("scale", 1.0)});
     }
     return keys;
   }
@@ -129,6 +131,10 @@ class Builder {
       groom.grow = grow(block["grow"]);
       groom.width = groom.grow->width;
     }
+    if (block.contains("hair_mesh")) {
+      groom.hair_mesh = hair_mesh_strands(block["hair_mesh"]);
+      groom.width = block["width"];
+    }
     groom.units = units(block);
     groom.attach =
         word<Attach>(block["attach"],
@@ -167,6 +173,11 @@ class Builder {
     return grow;
   }
 
+  HairMeshStrands hair_mesh_strands(const Json& block) const {
+    return {path(block["file"]),  block["strands"],    block["density"], block["particles"],  block["seed"],
+            block["curl_radius"], block["curl_turns"], block["noise"],   block["noise_waves"]};
+  }
+
   static Interpolate interpolate(const std::string& pointer, const Json& block) {
     const auto strands = block.value("strands", std::vector<int>{});
     return {block.value("count", 0), optional<std::string>(block, "group"), strands, block["neighbours"],
@@ -186,8 +197,9 @@ class Builder {
     const Json& block = document_["model"];
     const Json& stiffness = block["stiffness"];
     Model model;
-    model.type =
-        word<ModelType>(block["type"], {{"ams", ModelType::kAms}, {"mass_spring", ModelType::kMassSpring}});
+    model.type = word<ModelType>(block["type"], {{"ams", ModelType::kAms},
+                                                 {"mass_spring", ModelType::kMassSpring},
+                                                 {"hair_mesh", ModelType::kHairMesh}});
     model.scheme =
         word<Scheme>(block["scheme"], {{"projected", Scheme::kProjected}, {"paper", Scheme::kPaper}});
     model.stiffness = {stiffness["edge"], stiffness["bend"], stiffness["twist"], stiffness["integrity"],
@@ -205,6 +217,25 @@ class Builder {
     model.integrity_tangent =
         word<IntegrityTangent>(block["integrity_tangent"],
                                {{"exact", IntegrityTangent::kExact}, {"paper", IntegrityTangent::kPaper}});
+    if (model.type == ModelType::kHairMesh) model.hair_mesh = hair_mesh_model(block["hair_mesh"]);
+    return model;
+  }
+
+  static HairMeshModel hair_mesh_model(const Json& block) {
+    HairMeshModel model;
+    model.density = block["density"];
+    model.stretch = block["stretch"], model.stretch_across = block["stretch_across"];
+    model.shear = block["shear"], model.horizontal = block["horizontal"], model.volume = block["volume"];
+    model.bend = block["bend"], model.bend_across = block["bend_across"];
+    model.damping = block["damping"], model.drag = block["drag"];
+    model.residual = block["residual"], model.max_iterations = block["max_iterations"];
+    model.deformation_minimisation = block["deformation_minimisation"];
+    model.start = word<HairMeshStart>(
+        block["start"], {{"rest", HairMeshStart::kRest}, {"collapsed", HairMeshStart::kCollapsed}});
+    for (const Json& ellipsoid : block["ellipsoids"])
+      model.ellipsoids.push_back({vec3(ellipsoid["centre"]), vec3(ellipsoid["radii"]),
+                                  rotation(ellipsoid["rotate"]), ellipsoid["follow"] == "head",
+                                  ellipsoid["friction"]});
     return model;
   }
 

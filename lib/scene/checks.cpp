@@ -59,6 +59,7 @@ class Checks {
     keys("/motion", document_["motion"]);
     if (has_head()) keys("/head/animation", document_["head"]["animation"]);
     for (const auto& [pointer, groom] : grooms_of(document_)) check_groom(pointer, *groom);
+    hair_mesh_model();
     non_hookean();
     wind();
     hair_hair();
@@ -97,7 +98,8 @@ class Checks {
 
   void check_groom(const std::string& pointer, const Json& groom) {
     const bool file = groom.contains("file"), grow = groom.contains("grow");
-    if (file == grow) add(pointer, file ? "both file and grow" : "neither file nor grow", "one of them");
+    one_of(pointer, groom, {"file", "grow", "hair_mesh"});
+    if (groom.contains("hair_mesh")) hair_mesh_groom(pointer, groom);
     if (grow && !file) grown_groom(pointer, groom);
     if (file && groom["file"].is_array() && groom["file"].size() > 1 && groom.contains("skin"))
       add(pointer + "/skin", brief(groom["skin"]), "none with several files",
@@ -116,6 +118,50 @@ class Checks {
     const Json& scales = groom["stiffness"];
     for (std::size_t i = 0; i < scales.size(); ++i)
       curve(pointer + "/stiffness" + pointer_token(i) + "/curve", scales[i]["curve"]);
+  }
+
+  void hair_mesh_groom(const std::string& pointer, const Json& groom) {
+    for (const char* key : {"skin", "attach"})
+      if (groom.contains(key) && (std::string(key) == "skin" || groom[key] == "stored"))
+        add(pointer + pointer_token(key), brief(groom[key]), "none with hair_mesh",
+            "its strands are made anew: no file stores where they grow");
+    const Json& block = groom["hair_mesh"];
+    const bool count = block["strands"] != 0, density = block["density"] != 0;
+    if (count == density)
+      add(pointer + "/hair_mesh", count ? "both strands and density" : "neither strands nor density above 0",
+          "one of them");
+  }
+
+  // What the model hair_mesh cannot do is told, not passed over.
+  void hair_mesh_model() {
+    const Json& model = document_["model"];
+    if (model["type"] != "hair_mesh") {
+      if (model.contains("hair_mesh"))
+        add("/model/hair_mesh", "hair_mesh with model " + brief(model["type"]),
+            "none, or type \"hair_mesh\"");
+      return;
+    }
+    for (const auto& [pointer, groom] : grooms_of(document_)) {
+      if (!groom->contains("hair_mesh"))
+        add(pointer, "strands without a hair mesh", "hair_mesh, for the model \"hair_mesh\"",
+            "ringlet groom hair-mesh makes one for a head");
+      for (const char* key : {"interpolate", "stiffness"})
+        if (groom->contains(key) && !(*groom)[key].empty())
+          add(pointer + pointer_token(key), "a key of simulated strands", "none with model \"hair_mesh\"");
+    }
+    for (const char* key : {"inextensible", "hair_hair"})
+      if (document_["effects"].contains(key))
+        add("/effects" + pointer_token(key), "an effect of simulated strands",
+            "none with model \"hair_mesh\"", "--set /effects/" + std::string(key) + "=null leaves it out");
+    const Json wind = document_["effects"].value("wind", Json::object());
+    if (wind.contains("shelter"))
+      add("/effects/wind/shelter", brief(wind["shelter"]), "none with model \"hair_mesh\"",
+          "shelter is reckoned strand by strand");
+    const Json& ellipsoids = model["hair_mesh"]["ellipsoids"];
+    for (std::size_t i = 0; i < ellipsoids.size(); ++i)
+      if (is_zero(ellipsoids[i]["rotate"]))
+        add("/model/hair_mesh/ellipsoids" + pointer_token(i) + "/rotate", brief(ellipsoids[i]["rotate"]),
+            "a quaternion that is not zero");
   }
 
   void grown_groom(const std::string& pointer, const Json& groom) {

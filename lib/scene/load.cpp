@@ -46,6 +46,7 @@ void derive_names(Json& document) {
   };
   for (const auto& [pointer, ignored] : grooms_of(document)) {
     Json& groom = document[Json::json_pointer(pointer)];
+    if (groom.contains("hair_mesh") && !groom.contains("file")) derive(groom, groom["hair_mesh"]["file"]);
     if (!groom.contains("file") || groom.contains("grow")) continue;
     derive(groom, groom["file"].is_array() ? groom["file"][0] : groom["file"]);
   }

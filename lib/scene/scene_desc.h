@@ -108,6 +108,19 @@ struct Grow {
   double width;              // [m] strand diameter
 };
 
+// Strands through the layers of a hair mesh (groom/hair_mesh_strands.h).
+struct HairMeshStrands {
+  std::filesystem::path file;
+  int strands;     // 0: by `density`
+  double density;  // [1/m^2]; 0: by `strands`
+  int particles;   // of each, root included
+  std::int64_t seed;
+  double curl_radius;  // [m]
+  double curl_turns;
+  double noise;  // [m]
+  double noise_waves;
+};
+
 struct StiffnessScale {  // multiplies the model's stiffness along the strand
   std::string group;     // "" : every group of this groom
   std::string coupling;  // edge, bend, twist, integrity, angular, or all
@@ -129,6 +142,7 @@ struct Groom {
   std::vector<std::filesystem::path> more;    // further files of the same kind, appended as groups
   std::optional<std::filesystem::path> skin;  // .tfxskin beside a .tfx; default: same name if it exists
   std::optional<Grow> grow;                   // or grown on the head
+  std::optional<HairMeshStrands> hair_mesh;   // or through a hair mesh
   UnitsOverride units;
   Attach attach;
   double attach_distance;  // [m] roots farther than this from the head are an error
@@ -137,14 +151,14 @@ struct Groom {
   Animation animation;  // attach fixed only
   std::vector<StiffnessScale> stiffness;
   std::optional<Interpolate> interpolate;
-  double width;  // [m] strand diameter where the file gives none
+  double width;  // [m] strand diameter where no file gives it
   std::string pointer;
 };
 
 // ---- Model
 // -------------------------------------------------------------------------------------------------------
 
-enum class ModelType { kAms, kMassSpring };
+enum class ModelType { kAms, kMassSpring, kHairMesh };
 enum class Scheme { kProjected, kPaper };  // physics.md section 1
 enum class AngularTangent { kConsistent, kPaper };
 enum class IntegrityTangent { kExact, kPaper };
@@ -152,6 +166,30 @@ enum class IntegrityTangent { kExact, kPaper };
 struct Stiffness {
   double edge, bend, twist, integrity, angular;
 };  // per unit mass [1/s^2]
+
+struct Ellipsoid {  // at rest
+  Vec3 centre;      // [m]
+  Vec3 radii;       // [m]
+  Quat rotation;    // of its axes from the scene's
+  bool follows_head;
+  double friction;  // Coulomb mu [-]
+};
+
+enum class HairMeshStart { kRest, kCollapsed };
+
+// physics.md section 8; kernels/hairmesh/hair_mesh_elements.h says what the stiffnesses are of.
+struct HairMeshModel {
+  double density;                                             // [kg/m^3]
+  double stretch, stretch_across, shear, horizontal, volume;  // [Pa]
+  double bend, bend_across;                                   // [Pa m^2]
+  double damping;                                             // [s]
+  double drag;                                                // [1/s]
+  double residual;                                            // of the solves, relative [-]
+  int max_iterations;
+  bool deformation_minimisation;
+  HairMeshStart start;
+  std::vector<Ellipsoid> ellipsoids;
+};
 
 struct Model {
   ModelType type;
@@ -166,6 +204,7 @@ struct Model {
   double material_damping;  // beta [s]
   AngularTangent angular_tangent;
   IntegrityTangent integrity_tangent;
+  std::optional<HairMeshModel> hair_mesh;  // of this type alone
 };
 
 // ---- Effects

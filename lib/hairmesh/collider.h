@@ -1,0 +1,34 @@
+// What hair meshes collide with over a substep: the scene's solids, and ellipsoids.
+#pragma once
+#include <vector>
+
+#include "core/geometry.h"
+#include "kernels/hairmesh/hair_mesh_solver.h"
+#include "kernels/solid/solid_view.h"
+#include "scene/scene_desc.h"
+
+namespace ringlet::hairmesh {
+
+// A solid of a level set as the solver asks for it. Points and velocities are against `origin` [m], which
+// does not move; `step` [s] is the substep that the view is of.
+template <class T>
+class SolidCollider {
+ public:
+  SolidCollider(const kernels::SolidView& solid, const Vec3& origin, double step)
+      : solid_(solid), origin_(origin), step_(step) {}
+
+  // As kernels::MeshSurface::find.
+  bool operator()(const T* point, T reach, kernels::MeshSurfacePoint<T>& found) const;
+
+ private:
+  const kernels::SolidView& solid_;
+  Vec3 origin_;
+  double step_;
+};
+
+// An ellipsoid that was carried from `before` to `now` by a substep of `step` [s].
+template <class T>
+kernels::MeshEllipsoid<T> moving_ellipsoid(const scene::Ellipsoid& rest, const Pose& before, const Pose& now,
+                                           const Vec3& origin, double step);
+
+}  // namespace ringlet::hairmesh

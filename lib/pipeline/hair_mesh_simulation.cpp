@@ -1,0 +1,349 @@
+#include "pipeline/hair_mesh_simulation.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/log.h"
+#include "core/timer.h"
+#include "effects/instruction_set.h"
+#include "effects/wind/wind_field.h"
+#include "groom/hair_mesh_strands.h"
+#include "hairmesh/body.h"
+#include "pipeline/frames.h"
+#include "pipeline/world.h"
+#include "solids/keyframes.h"
+
+namespace ringlet::pipeline {
+namespace {
+
+// One groom: its mesh, the strands through it, and where its roots go.
+template <class T>
+struct Part {
+  groom::HairMeshStrands strands;
+  Roots roots;  // of the mesh's columns
+  std::vector<Pose> poses;
+  std::vector<Vec3> air;  // [vertices] [m/s]; empty: still
+  hairmesh::Body<T> body;
+  std::int64_t first_strand, first_particle;  // in the cache
+};
+
+template <class T>
+Part<T> make_part(const scene::Scene& scene, const World& world, const scene::Groom& desc,
+                  kernels::InstructionSet set) {
+  const groom::HairMesh mesh = groom::read_scene_hair_mesh(desc, scene.units);
+  groom::Strands columns = hairmesh::columns_of(mesh);
+  std::vector<Vec3> rest(mesh.layer(0).begin(), mesh.layer(0).end());
+  Roots roots(world.head.get(), scene.frames);
+  if (desc.attach == scene::Attach::kFixed)
+    roots.add_fixed(desc.animation, std::move(rest));
+  else
+    roots.add_attached(groom::Attachment::to_head(columns, scalp_of(*world.head), desc), std::move(rest));
+  std::vector<Pose> poses(mesh.vertices());
+  roots.pose(first_time(scene.frames), poses);
+  hairmesh::Body<T> body(mesh, *scene.model.hair_mesh, poses, set);
+  log_info(fmt::format("groom \"{}\": hair mesh of {} faces, {} layers, {} vertices, {} prisms", desc.name,
+                       mesh.faces.size(), mesh.layers, mesh.positions.size(), mesh.prisms()));
+  return {groom::scene_strands(desc, mesh), std::move(roots), std::move(poses), {}, std::move(body), 0, 0};
+}
+
+template <class T>
+class HairMeshSimulation : public Simulation {
+ public:
+  HairMeshSimulation(const scene::Scene& scene, const Options& options)
+      : scene_(scene),
+        set_(effects::choose_instruction_set(options.instruction_set)),
+        world_(build_world(scene_)) {
+    std::int64_t strands = 0, particles = 0;
+    for (const scene::Groom& desc : scene_.grooms) {
+      Part<T>& part = parts_.emplace_back(make_part<T>(scene_, world_, desc, set_));
+      part.first_strand = strands, part.first_particle = particles;
+      strands += static_cast<std::int64_t>(part.strands.size());
+      particles += static_cast<std::int64_t>(part.strands.size()) * part.strands.points();
+    }
+    points_.resize(static_cast<std::size_t>(particles));
+    if (asks_for_velocity()) speeds_.resize(points_.size());
+    if (scene_.effects.wind) {
+      wind_.emplace(*scene_.effects.wind, scene_.frames, parts_[0].body.origin());
+      for (Part<T>& part : parts_) part.air.resize(part.body.positions().size());
+    }
+    make_plan(strands, particles);
+  }
+
+  const Plan& plan() const override { return plan_; }
+
+  state::RunHeader header(const FrameRange& range) const override {
+    state::RunHeader header = make_header(scene_, world_);
+    header.program_version = RINGLET_VERSION;
+    header.backend = "cpu";
+    header.instruction_set = kernels::name_of(set_);
+    header.precision = sizeof(T) == 8 ? "double" : "float";
+    header.first_frame = range.first, header.last_frame = range.last;
+    return header;
+  }
+
+  bool run(const FrameRange& range, state::FrameSink& sink, const RunControl& control) override;
+
+ private:
+  bool asks_for_velocity() const {
+    const auto& fields = scene_.cache.fields;
+    return std::find(fields.begin(), fields.end(), "velocity") != fields.end();
+  }
+  bool has_solids() const { return !world_.solids.empty() || !scene_.model.hair_mesh->ellipsoids.empty(); }
+  double time_of(int frame, int substep) const {
+    const double n = static_cast<double>(frame - scene_.frames.first) * scene_.model.substeps + substep;
+    return n / (scene_.frames.fps * scene_.model.substeps);
+  }
+
+  void make_plan(std::int64_t strands, std::int64_t particles);
+  void step_frame(int frame);
+  void substep(int frame, double before, double now);
+  void blow(double time);
+  std::vector<kernels::MeshEllipsoid<T>> ellipsoids(const Part<T>& part, double before, double now) const;
+  Pose carrier(const scene::Ellipsoid& ellipsoid, double time) const;
+  void check(int frame);
+  state::Frame frame_now(int frame);
+  state::Figures figures() const;
+  state::Snapshot snapshot(int frame) const;
+  void resume(const state::Snapshot& snapshot);
+
+  template <class Work>
+  void timed(const char* name, const Work& work) {
+    const Timer timer;
+    work();
+    for (auto& [stage, spent] : seconds_)
+      if (stage == name) spent += timer.seconds();
+  }
+
+  scene::Scene scene_;
+  kernels::InstructionSet set_;
+  World world_;
+  std::vector<Part<T>> parts_;
+  std::optional<effects::WindField> wind_;
+  std::vector<Vec3> points_, speeds_;  // [particles] of the cache
+  hairmesh::FrameFigures taken_;
+  StageSeconds seconds_;
+  Plan plan_;
+};
+
+template <class T>
+void HairMeshSimulation<T>::make_plan(std::int64_t strands, std::int64_t particles) {
+  plan_.strands = strands, plan_.particles = particles;
+  plan_.substeps = scene_.model.substeps;
+  plan_.frames = scene_.frames.last - scene_.frames.first + scene_.frames.preroll;
+  std::size_t bodies = 0, roots = 0, air = 0, generators = (points_.size() + speeds_.size()) * sizeof(Vec3),
+              solids = 0;
+  bool still = true;
+  for (const Part<T>& part : parts_) {
+    bodies += part.body.bytes(), roots += part.poses.size() * sizeof(Pose),
+        air += part.air.size() * sizeof(Vec3);
+    generators += part.strands.bytes();
+    still = still && part.roots.still();
+  }
+  for (const solids::Solid& solid : world_.solids) solids += solid.bytes();
+  const auto add = [&](const char* name, const char* what, bool runs, std::size_t bytes) {
+    plan_.stages.push_back({name, what, runs, runs ? bytes : 0, 0});  // no kernels of a device
+    if (runs) seconds_.emplace_back(name, 0.0);
+  };
+  add("roots", "the scalp's vertices carried by the head", true, roots);
+  add("wind", "mean wind, gusts, turbulence", wind_.has_value(), air);
+  add("forces", "stretch, shear, bend and volume of the hair mesh, its matrix", true, bodies);
+  add("solve", "implicit step by filtered conjugate gradients", true, 0);
+  add("solids", "outer vertices moved out of level sets and ellipsoids, friction", has_solids(), solids);
+  add("minimisation", "the rest of the mesh taken along",
+      has_solids() && scene_.model.hair_mesh->deformation_minimisation, 0);
+  add("strands", "strands through the layers, once a frame", true, generators);
+}
+
+template <class T>
+void HairMeshSimulation<T>::blow(double time) {
+  const kernels::WindField<double> field = wind_->at<double>(time);
+  for (Part<T>& part : parts_)
+    tbb::parallel_for(std::size_t{0}, part.air.size(), [&](std::size_t v) {
+      const Vec3& x = part.body.positions()[v];
+      const kernels::Vector3<double> air = kernels::air_velocity(
+          field, kernels::Vector3<double>{x.x() - field.origin[0], x.y() - field.origin[1],
+                                          x.z() - field.origin[2]});
+      part.air[v] = {air.x, air.y, air.z};
+    });
+}
+
+// What takes an ellipsoid from where it is at rest to where it is at a time.
+template <class T>
+Pose HairMeshSimulation<T>::carrier(const scene::Ellipsoid& ellipsoid, double time) const {
+  if (ellipsoid.follows_head && world_.head) {
+    if (world_.head->motion() != solids::AnimatedMesh::Motion::kDeforming) return world_.head->pose(time);
+    std::vector<Vec3> vertices(world_.head->vertex_count());
+    world_.head->sample(time, vertices);
+    return world_.head->nearest_pose(vertices);
+  }
+  scene::Animation motion;
+  motion.carrier = scene_.grooms[0].animation.carrier;
+  motion.carrier_interpolation = scene_.grooms[0].animation.carrier_interpolation;
+  motion.speed = scene_.grooms[0].animation.speed;
+  const solids::Similarity moved = solids::sample_animation(motion, scene_.frames, time);
+  return {moved.rotate.toRotationMatrix(), moved.translate};
+}
+
+template <class T>
+std::vector<kernels::MeshEllipsoid<T>> HairMeshSimulation<T>::ellipsoids(const Part<T>& part, double before,
+                                                                         double now) const {
+  std::vector<kernels::MeshEllipsoid<T>> moving;
+  for (const scene::Ellipsoid& ellipsoid : scene_.model.hair_mesh->ellipsoids)
+    moving.push_back(hairmesh::moving_ellipsoid<T>(
+        ellipsoid, carrier(ellipsoid, before), carrier(ellipsoid, now), part.body.origin(), now - before));
+  return moving;
+}
+
+template <class T>
+void HairMeshSimulation<T>::substep(int frame, double before, double now) {
+  timed("roots", [&] {
+    for (Part<T>& part : parts_) part.roots.pose(now, part.poses);
+  });
+  if (wind_) timed("wind", [&] { blow(now); });
+  const Vec3 gravity = scene_.effects.gravity.value_or(Vec3::Zero());
+  timed("forces", [&] {
+    for (Part<T>& part : parts_) part.body.assemble(now - before, part.poses, gravity, part.air);
+  });
+  timed("solve", [&] {
+    for (Part<T>& part : parts_) part.body.solve(taken_);
+  });
+  check(frame);
+  if (!has_solids()) return;
+  timed("solids", [&] {
+    std::vector<kernels::SolidView> views;
+    for (solids::Solid& solid : world_.solids) views.push_back(solid.at(before, now));
+    for (Part<T>& part : parts_) part.body.collide(views, ellipsoids(part, before, now), taken_);
+  });
+  if (scene_.model.hair_mesh->deformation_minimisation)
+    timed("minimisation", [&] {
+      for (Part<T>& part : parts_) part.body.minimise(taken_);
+    });
+  check(frame);
+}
+
+template <class T>
+void HairMeshSimulation<T>::step_frame(int frame) {
+  taken_ = {};
+  for (auto& [stage, spent] : seconds_) spent = 0;
+  for (int s = 0; s < scene_.model.substeps; ++s)
+    substep(frame, time_of(frame - 1, s), time_of(frame - 1, s + 1));
+}
+
+template <class T>
+void HairMeshSimulation<T>::check(int frame) {
+  for (std::size_t k = 0; k < parts_.size(); ++k) {
+    const auto diverged = parts_[k].body.diverged(scene_.limits);
+    if (!diverged) continue;
+    throw Diverged(
+        frame_now(frame), "solve", parts_[k].first_strand, -1,
+        fmt::format("the simulation diverged: groom `{}`, vertex {} of layer {} of its hair mesh: {}",
+                    scene_.grooms[k].name, diverged->column, diverged->layer, diverged->what));
+  }
+}
+
+template <class T>
+state::Frame HairMeshSimulation<T>::frame_now(int frame) {
+  for (const Part<T>& part : parts_) {
+    const auto first = static_cast<std::size_t>(part.first_particle),
+               count = part.strands.size() * static_cast<std::size_t>(part.strands.points());
+    part.strands.place(part.body.positions(), std::span(points_).subspan(first, count));
+    if (!speeds_.empty())
+      part.strands.place(part.body.velocities(), std::span(speeds_).subspan(first, count));
+  }
+  return make_frame(scene_, world_, points_, speeds_, frame, time_of(frame, 0));
+}
+
+template <class T>
+state::Figures HairMeshSimulation<T>::figures() const {
+  double volume = 0, rest = 0, strain = 0, speed = 0;
+  kernels::MeshEnergies energy;
+  for (const Part<T>& part : parts_) {
+    volume += part.body.volume(), rest += part.body.rest_volume();
+    strain = std::max(strain, part.body.strain()), speed = std::max(speed, part.body.speed());
+    const kernels::MeshEnergies one = part.body.energies();
+    energy.stretch += one.stretch, energy.horizontal += one.horizontal, energy.sheets += one.sheets;
+    energy.bend += one.bend, energy.volume += one.volume, energy.kinetic += one.kinetic;
+  }
+  state::Figures figures = {{"mesh_solves", taken_.solves},
+                            {"mesh_iterations", taken_.iterations},
+                            {"mesh_residual", taken_.residual},
+                            {"mesh_volume", volume / rest},
+                            {"mesh_strain", strain},
+                            {"mesh_speed", speed},
+                            {"energy_stretch", energy.stretch},
+                            {"energy_horizontal", energy.horizontal},
+                            {"energy_sheets", energy.sheets},
+                            {"energy_bend", energy.bend},
+                            {"energy_volume", energy.volume},
+                            {"energy_kinetic", energy.kinetic}};
+  if (has_solids())
+    figures.insert(figures.end(), {{"mesh_touched", taken_.touched},
+                                   {"mesh_corrected", taken_.corrected},
+                                   {"mesh_depth", taken_.depth},
+                                   {"minimisations", taken_.minimisations},
+                                   {"minimisation_iterations", taken_.minimise_iterations},
+                                   {"minimisation_residual", taken_.minimise_residual}});
+  return figures;
+}
+
+template <class T>
+state::Snapshot HairMeshSimulation<T>::snapshot(int frame) const {
+  state::Snapshot snapshot;
+  snapshot.frame = frame;
+  for (std::size_t k = 0; k < parts_.size(); ++k)
+    parts_[k].body.save(snapshot, k == 0 ? "" : fmt::format("_{}", k));
+  return snapshot;
+}
+
+template <class T>
+void HairMeshSimulation<T>::resume(const state::Snapshot& snapshot) {
+  for (std::size_t k = 0; k < parts_.size(); ++k)
+    parts_[k].body.restore(snapshot, k == 0 ? "" : fmt::format("_{}", k));
+}
+
+template <class T>
+bool HairMeshSimulation<T>::run(const FrameRange& range, state::FrameSink& sink, const RunControl& control) {
+  int frame = scene_.frames.first - scene_.frames.preroll;
+  const auto hand_on = [&](double spent) {
+    state::Frame out;
+    timed("strands", [&] { out = frame_now(frame); });
+    out.figures = figures();
+    sink.write(std::move(out), snapshot(frame), spent);
+  };
+  for (Part<T>& part : parts_) {
+    part.roots.pose(first_time(scene_.frames), part.poses);
+    part.body.start(part.poses);
+  }
+  if (control.resume) {
+    frame = control.resume->frame;
+    resume(*control.resume);
+  } else if (frame >= range.first) {
+    hand_on(0);
+  }
+  while (frame < range.last) {
+    if (control.stop && *control.stop) return false;
+    const Timer timer;
+    ++frame;
+    step_frame(frame);
+    if (frame >= range.first) hand_on(timer.seconds());
+    if (control.on_frame) control.on_frame(frame, timer.seconds(), seconds_);
+  }
+  sink.finish();
+  return true;
+}
+
+}  // namespace
+
+std::unique_ptr<Simulation> make_hair_mesh_simulation(const scene::Scene& scene, const Options& options) {
+  if (options.backend == Backend::kCuda)
+    throw Error(ErrorKind::kDevice, "--backend cuda", "the model hair_mesh steps on the CPU",
+                "use --backend cpu or auto");
+  if (options.precision == Precision::kDouble)
+    return std::make_unique<HairMeshSimulation<double>>(scene, options);
+  return std::make_unique<HairMeshSimulation<float>>(scene, options);
+}
+
+}  // namespace ringlet::pipeline

@@ -1,0 +1,173 @@
+"""The hair-mesh model through the program."""
+import json
+
+import h5py
+import numpy as np
+import pytest
+
+from conftest import run
+from tiny import LAST, RADIUS, frame_bytes, write_scene
+from tiny_mesh import ACROSS, LAYERS, write_mesh_scene
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory):
+    return write_mesh_scene(tmp_path_factory.mktemp("mesh"))
+
+
+def steps(program, scene, out, *options):
+    result = run(program, "run", scene, "-o", out, "--progress", "none", *options)
+    assert result.returncode == 0, result.stderr
+    return frame_bytes(out)
+
+
+def figures(out, name):
+    with h5py.File(out / "tiny.h5") as cache:
+        return cache["figures"][name][:]
+
+
+def positions(out, frame):
+    with h5py.File(out / f"tiny.{frame:04}.h5") as cache:
+        return cache["position"][:]
+
+
+def stages(program, scene, *options):
+    result = run(program, "plan", scene, "--json", *options)
+    assert result.returncode == 0, result.stderr
+    return {stage["name"]: stage for stage in json.loads(result.stdout)["stages"]}
+
+
+# ---- running
+
+
+@pytest.mark.parametrize("precision", ["float", "double"])
+def test_a_run_cut_in_the_middle_goes_on_bit_for_bit(program, scene, tmp_path, precision):
+    options = ["--precision", precision, '--set=/effects/wind={"velocity": [3, 0, 0], "turbulence": {}}']
+    whole = steps(program, scene, tmp_path / "whole", *options)
+    steps(program, scene, tmp_path / "cut", *options, f"--set=/frames/last={LAST - 2}", "--threads", "1")
+    assert steps(program, scene, tmp_path / "cut", *options, "--resume") == whole
+    assert figures(tmp_path / "whole", "mesh_touched").max() > 0
+
+
+def test_instruction_sets_and_substeps(program, scene, tmp_path):
+    whole = steps(program, scene, tmp_path / "whole")
+    assert steps(program, scene, tmp_path / "same") == whole
+    steps(program, scene, tmp_path / "fine", "--set=/model/substeps=8")
+    apart = np.linalg.norm(positions(tmp_path / "whole", LAST) - positions(tmp_path / "fine", LAST), axis=1)
+    assert 0 < apart.max() < 0.5 * RADIUS
+
+
+def test_frame_one_is_the_rest_shape_and_strands_start_on_the_head(program, scene, tmp_path):
+    steps(program, scene, tmp_path / "out")
+    with h5py.File(tmp_path / "out/tiny.h5") as cache:
+        rest, offsets = cache["rest_position"][:], cache["offsets"][:]
+    first = positions(tmp_path / "out", 1)
+    assert np.allclose(first, rest, atol=1e-6)
+    radii = np.linalg.norm(first[offsets[:-1]], axis=1)  # the scalp's faces are chords of the ball
+    assert (radii < RADIUS + 1e-6).all() and (radii > 0.93 * RADIUS).all()
+
+
+def test_the_figures_tell_of_the_solves(program, scene, tmp_path):
+    steps(program, scene, tmp_path / "out", "--set=/model/substeps=2")
+    out = tmp_path / "out"
+    assert (figures(out, "mesh_solves")[1:] == 2).all()
+    assert (figures(out, "mesh_iterations")[1:] > 0).all()
+    assert figures(out, "mesh_residual").max() <= 1e-4
+    assert np.abs(figures(out, "mesh_volume") - 1).max() < 0.5
+
+
+def test_velocities_are_those_of_the_way(program, scene, tmp_path):
+    out = tmp_path / "out"
+    steps(program, scene, out, '--set=/cache/fields=["position", "velocity"]', "--set=/effects/solids=[]")
+    with h5py.File(out / f"tiny.{LAST:04}.h5") as cache:
+        velocity = cache["velocity"][:]
+    way = 24 * (positions(out, LAST) - positions(out, LAST - 1))
+    assert np.abs(velocity - way).max() < 1e-3 * np.abs(way).max()
+
+
+def test_collapsed_hair_recovers(program, scene, tmp_path):
+    options = ["--set=/head/animation=null", "--set=/effects/solids=[]", "--set=/frames/last=121"]
+    steps(program, scene, tmp_path / "rest", *options)
+    steps(program, scene, tmp_path / "collapsed", *options, '--set=/model/hair_mesh/start="collapsed"')
+    start = positions(tmp_path / "collapsed", 1)
+    assert np.ptp(start.reshape(200, -1, 3), axis=1).max() < 1e-6
+    settled, recovered = positions(tmp_path / "rest", 121), positions(tmp_path / "collapsed", 121)
+    assert np.linalg.norm(settled - recovered, axis=1).max() < 0.01 * 0.09
+    volumes = [figures(tmp_path / name, "mesh_volume")[-1] for name in ("rest", "collapsed")]
+    assert volumes[1] == pytest.approx(volumes[0], rel=0.01)
+
+
+def test_ellipsoids_keep_hair_out_and_minimisation_is_left_out_when_not_asked_for(program, scene, tmp_path):
+    ellipsoid = {"centre": [0, 0, 0], "radii": [RADIUS, RADIUS, RADIUS]}
+    options = ["--set=/effects/solids=[]", f"--set=/model/hair_mesh/ellipsoids=[{json.dumps(ellipsoid)}]"]
+    steps(program, scene, tmp_path / "on", *options)
+    assert figures(tmp_path / "on", "mesh_touched").max() > 0
+    off = "--set=/model/hair_mesh/deformation_minimisation=false"
+    steps(program, scene, tmp_path / "off", *options, off)
+    assert figures(tmp_path / "off", "minimisations").max() == 0
+    assert "minimisation" in {name for name, stage in stages(program, scene, *options).items() if stage["runs"]}
+    assert not stages(program, scene, *options, off)["minimisation"]["runs"]
+
+
+def test_the_plan_has_what_the_scene_calls_for(program, scene):
+    bare = stages(program, scene, "--set=/effects/solids=[]")
+    running = {name for name, stage in bare.items() if stage["runs"]}
+    assert running == {"roots", "forces", "solve", "strands"}
+    assert all(stage["bytes"] == 0 for stage in bare.values() if not stage["runs"])
+    windy = stages(program, scene, '--set=/effects/wind={"velocity": [1, 0, 0]}')
+    assert windy["wind"]["bytes"] == ACROSS * ACROSS * LAYERS * 24
+
+
+def test_the_strands_of_a_mesh_can_be_simulated_themselves(program, scene, tmp_path):
+    options = ["--set=/model=null", "--set=/effects/inextensible={}"]
+    steps(program, scene, tmp_path / "ams", *options)
+    steps(program, scene, tmp_path / "mesh")
+    with h5py.File(tmp_path / "ams/tiny.h5") as one, h5py.File(tmp_path / "mesh/tiny.h5") as other:
+        assert (one["offsets"][:] == other["offsets"][:]).all()
+    assert figures(tmp_path / "ams", "edge_strain_free").max() <= 1e-3
+
+
+# ---- what is refused
+
+
+@pytest.mark.parametrize(
+    "change, expected",
+    [
+        ("/effects/inextensible={}", "/effects/inextensible: found an effect of simulated strands"),
+        ('/effects/hair_hair={"grid": {}}', "/effects/hair_hair: found an effect of simulated strands"),
+        ("/groom/hair_mesh/strands=0", "/groom/hair_mesh: found neither strands nor density above 0, expected one of them"),
+        ("/groom/hair_mesh/density=5e4", "/groom/hair_mesh: found both strands and density, expected one of them"),
+        ("/groom/hair_mesh=null", "/groom: found none of file, grow, hair_mesh"),
+        ('/groom/attach="stored"', "/groom/attach: found \"stored\", expected none with hair_mesh"),
+        ('/groom/interpolate={"count": 3}', "/groom/interpolate: found a key of simulated strands"),
+        ('/effects/wind={"velocity": [1, 0, 0], "shelter": {}}', "/effects/wind/shelter: found"),
+        ('/model/hair_mesh={"stretch": -1}', "/model/hair_mesh/stretch: found -1, expected a number"),
+        ('/model/type="ams"', "/model/hair_mesh: found hair_mesh with model \"ams\""),
+    ],
+)
+def test_what_the_model_cannot_do_is_told(program, tmp_path, change, expected):
+    scene = write_mesh_scene(tmp_path, lambda scene: scene["model"].update(hair_mesh={}))
+    result = run(program, "validate", scene, "--set", change)
+    assert result.returncode == 3
+    assert expected in result.stderr
+
+
+def test_the_model_needs_hair_meshes(program, tmp_path):
+    scene = write_scene(tmp_path, lambda scene: scene["model"].update(type="hair_mesh"))
+    result = run(program, "validate", scene, "--set=/effects/inextensible=null")
+    assert result.returncode == 3
+    assert "/groom: found strands without a hair mesh, expected hair_mesh" in result.stderr
+
+
+def test_cuda_is_refused(program, scene, tmp_path):
+    result = run(program, "run", scene, "-o", tmp_path / "out", "--backend", "cuda")
+    assert result.returncode == 6
+    assert "error: --backend cuda: the model hair_mesh steps on the CPU (use --backend cpu or auto)" in result.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_run_beyond_the_limits_names_the_vertex(program, scene, tmp_path):
+    result = run(program, "run", scene, "-o", tmp_path / "out", "--set=/limits/speed=0.01")
+    assert result.returncode == 4
+    assert "vertex" in result.stderr and "layer" in result.stderr and "beyond the limit of 0.01 m/s" in result.stderr
+    assert (tmp_path / "out/tiny.failed.h5").exists()

@@ -1,0 +1,56 @@
+"""Hair mesh: a mannequin walks and turns, at its speed and ten times as fast, with and without minimisation."""
+import numpy as np
+
+from . import pictures
+
+SCENE = "hair_mesh/walk"
+MINIMISE = "/model/hair_mesh/deformation_minimisation"
+VARIANTS = {
+    "walk": {},
+    "ten times as fast": {"/motion/speed": 10},
+    "ten times as fast, no minimisation": {"/motion/speed": 10, MINIMISE: False},
+}
+FRAMES = [1, 5, 9, 13, 25, 145]  # of the fast ones; the walk itself is seen when it is as far on
+VIEW = (150, 8)
+
+
+def make(figures):
+    runs = {name: figures.run(SCENE, name.replace(",", "").replace(" ", "_"), each) for name, each in VARIANTS.items()}
+    rows = [
+        [
+            pictures.titled(
+                pictures.render(run, frame, pictures.shared_camera([(run, frame)], VIEW, figures.size(210)), **figures.look),
+                f"{name}, frame {frame}",
+            )
+            for frame in (FRAMES if run is not runs["walk"] else [1, 33, 49, 65, 89, 145])
+        ]
+        for name, run in runs.items()
+    ]
+    pictures.save(pictures.sheet(rows), figures.path(".png"))
+
+    def draw(ax):
+        for name, run in runs.items():
+            ax.plot(run.times, run.figure("mesh_volume"), label=name)
+        ax.set(xlabel="time [s]", ylabel="volume / rest volume")
+        ax.legend(fontsize=8)
+
+    pictures.plot(figures.path("_plot.png"), draw)
+    figures.record({name: numbers(run, runs["walk"]) for name, run in runs.items()})
+
+
+def numbers(run, walk):
+    """`apart`: of particles from those of the walk when both stand still, over the longest strand."""
+    last = run.frames[-1]
+    apart = np.linalg.norm(run.position(last) - walk.position(last), axis=1) / walk.lengths.max()
+    volume = run.figure("mesh_volume")
+    return {
+        "diverged_frame": run.diverged_frame,
+        "volume_over_rest": {"least": volume.min(), "most": volume.max(), "last": volume[-1]},
+        "apart_from_walk_last": {"mean": apart.mean(), "most": apart.max()},
+        "mesh_strain_most": run.worst("mesh_strain"),
+        "speed_most": run.worst("mesh_speed"),
+        "iterations_mean": float(np.mean(run.figure("mesh_iterations")[1:])),
+        "iterations_most": run.worst("mesh_iterations"),
+        "residual_most": run.worst("mesh_residual"),
+        "ms_per_frame_median": float(np.median(run.milliseconds())),
+    }

@@ -15,14 +15,19 @@ class MotionField {
     sum_motion(backend, places, extent);
     smooth(backend);
     carry(backend, places);
+    find_slopes(backend, places);
   }
 
   // [particles] where the mean motion takes it from its start to the end; extra: how far it takes the middle
   // of the segment that begins there from the middle of where it takes its ends [m].
   const Place<float>* carried() const { return carried_.data(); }
-  // How much the mean displacement changes over a distance, at most [-].
-  float slope() const { return slope_; }
-  std::size_t bytes() const { return sums_.bytes() + nodes_.bytes() + next_.bytes() + carried_.bytes(); }
+  // [particles] How much the mean displacement changes over a distance about the segment that begins there,
+  // at most [-].
+  const float* slope() const { return slope_.data(); }
+  std::size_t bytes() const {
+    return sums_.bytes() + nodes_.bytes() + next_.bytes() + carried_.bytes() + node_slope_.bytes() +
+           slope_.bytes();
+  }
 
  private:
   template <class V>
@@ -94,11 +99,6 @@ class MotionField {
           [=] RINGLET_LAMBDA(const MotionNode* from, std::int32_t node) {
             return less_steep(lattice, from, node, most);
           });
-    const MotionNode* nodes = nodes_.data();
-    slope_ = lattice.per_cell * static_cast<float>(backend.largest(
-                                    "steepness", lattice.total(), 0, [=] RINGLET_LAMBDA(std::int32_t k) {
-                                      return static_cast<double>(steepness(lattice, nodes, k));
-                                    }));
   }
 
   void carry(Backend& backend, const HairPlaces<T>& places) {
@@ -119,11 +119,30 @@ class MotionField {
     });
   }
 
+  void find_slopes(Backend& backend, const HairPlaces<T>& places) {
+    node_slope_.resize(lattice_.total()), slope_.resize(places.particles);
+    float *of_node = node_slope_.data(), *slope = slope_.data();
+    const MotionLattice lattice = lattice_;
+    const MotionNode* nodes = nodes_.data();
+    backend.parallel_for("slopes of nodes", lattice.total(), [=] RINGLET_LAMBDA(std::int32_t node) {
+      of_node[node] = slope_at(lattice, nodes, node);
+    });
+    backend.parallel_for("slopes", places.particles, [=] RINGLET_LAMBDA(std::int32_t p) {
+      slope[p] = 0;
+      if (places.strand[p] < 0) return;
+      const MotionCell begin(lattice, float_vector(places.start[p])),
+          end(lattice, float_vector(places.start[p + 1]));
+      for (int corner = 0; corner < 8; ++corner)
+        slope[p] =
+            max(slope[p], max(of_node[begin.corner(lattice, corner)], of_node[end.corner(lattice, corner)]));
+    });
+  }
+
   MotionLattice lattice_{};
-  float slope_ = 0;
   Buffer<MotionSum> sums_;
   Buffer<MotionNode> nodes_, next_;
   Buffer<Place<float>> carried_;
+  Buffer<float> node_slope_, slope_;
 };
 
 }  // namespace RINGLET_ISA

@@ -11,16 +11,14 @@ struct SweptBoxes {
   HairExtent extent;
   const Place<float>* carried;  // see MotionField
   bool from_anywhere;           // boxes hold the start and what is about it, whatever the way
-  const float* slope;           // see MotionField
+  float slope;                  // of the mean motion [-]
   float farthest;               // along a segment's way against the mean motion [m]
   float piece_length;           // about [m]
 
-  // Where a segment went `way` the mean motion can have carried what it met there from places between which
-  // it differs by this much [m].
-  RINGLET_KERNEL float aside(std::int32_t segment, float way) const {
-    const float gentle = min(slope[segment], 0.9f);
-    return gentle / (1 - gentle) * way;
-  }
+  // How far apart from the start on two can have been that meet: each went `farthest`, and the mean motion
+  // carried them there from places between which it differs by its slope times that. Half of it [m].
+  RINGLET_KERNEL float along_both() const { return farthest / (1 - gentle_slope()); }
+  RINGLET_KERNEL float gentle_slope() const { return min(slope, 0.9f); }
 };
 
 template <class Backend, class T>
@@ -78,8 +76,7 @@ class BoxSorter {
       const float share = 1 / static_cast<float>(pieces > 0 ? pieces : 1);
       for (std::int32_t k = 0; k < pieces; ++k)
         piece[start[p] + k] = {p, static_cast<float>(k) * share,
-                               k + 1 < pieces ? static_cast<float>(k + 1) * share : 1.0f,
-                               carried[p].extra + swept.aside(p, swept.farthest)};
+                               k + 1 < pieces ? static_cast<float>(k + 1) * share : 1.0f, carried[p].extra};
     });
     return boxes;
   }
@@ -101,7 +98,7 @@ class BoxSorter {
         static_cast<float>(kNear) * static_cast<float>(thickest(places.end, p)) + swept.carried[p].extra;
     if (swept.from_anywhere) {
       const Segment<float> start{float_vector(places.start[p]), float_vector(places.start[p + 1])};
-      return box_pieces(start, start, near + swept.farthest + swept.aside(p, swept.farthest), pieces, boxes);
+      return box_pieces(start, start, near + swept.along_both(), pieces, boxes);
     }
     const Segment<float> first{vector_of(swept.carried[p]), vector_of(swept.carried[p + 1])};
     const Vector3<float> begin_way = float_vector(places.end[p]) - first.begin,
@@ -109,7 +106,8 @@ class BoxSorter {
     const float way = max(length(begin_way), length(end_way));
     const float share = way > swept.farthest ? swept.farthest / way : 1.0f;
     const Segment<float> last{fma(share, begin_way, first.begin), fma(share, end_way, first.end)};
-    box_pieces(first, last, near + swept.aside(p, share * way), pieces, boxes);
+    box_pieces(first, last, near + swept.gentle_slope() / (1 - swept.gentle_slope()) * share * way, pieces,
+               boxes);
   }
 
   // Of what is between two places of a segment, with `more` about it.

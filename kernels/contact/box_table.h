@@ -84,7 +84,7 @@ struct BoxLevels {
 struct Piece {
   std::int32_t segment;
   float from, to;  // along the segment, in its lengths
-  float stray;     // how far the mean motion can have carried the segment and what it met apart [m]
+  float stray;     // of the segment, see MotionField [m]
 
   // Whether the place `at` in [0, 1] along the segment is on it: on one of its pieces.
   RINGLET_KERNEL bool holds(float at) const { return from <= at && (at < to || to >= 1); }

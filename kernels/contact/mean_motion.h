@@ -4,8 +4,8 @@
 // looked for along what is left of a segment's way without the mean motion, so that hair that moves together
 // costs no more than hair at rest. The field tells the displacement of what is at a place at the start. Of
 // two segments that meet each is carried by the field where it was; the difference is less than the field's
-// slope about there times how far the two moved against one another before they met, so the field is made
-// smooth. Sums are of whole numbers: in any order the same.
+// slope times how far the two moved against one another before they met, so the field is made smooth. Sums
+// are of whole numbers: in any order the same.
 #pragma once
 #include "kernels/contact/contact_data.h"
 
@@ -98,55 +98,37 @@ RINGLET_FUNCTION MotionNode less_steep(const MotionLattice& lattice, const Motio
   return moved;
 }
 
-// How much the mean displacement changes over a distance near a node, in any direction [-]. Between nodes it
-// is trilinear: its slope along an axis is a mean of those along the edges about.
-RINGLET_FUNCTION float slope_at(const MotionLattice& lattice, const MotionNode* nodes, std::int32_t node) {
-  float square = 0;
+// How much the mean motion changes from a node to the next along an axis.
+RINGLET_FUNCTION float steepness(const MotionLattice& lattice, const MotionNode* nodes, std::int32_t node,
+                                 int axis) {
   std::int32_t stride = 1;
-  for (int axis = 0; axis < 3; ++axis) {
-    const std::int32_t at = node / stride % lattice.nodes[axis];
-    float most = 0;
-    for (std::int32_t first = at > 0 ? -1 : 0; first < 1 && at + first + 1 < lattice.nodes[axis]; ++first) {
-      const MotionNode &one = nodes[node + first * stride], &next = nodes[node + (first + 1) * stride];
-      float along = 0;
-      for (int c = 0; c < 3; ++c) along += (next.mean[c] - one.mean[c]) * (next.mean[c] - one.mean[c]);
-      most = max(most, along);
-    }
-    square += most;
-    stride *= lattice.nodes[axis];
+  for (int c = 0; c < axis; ++c) stride *= lattice.nodes[c];
+  if (node / stride % lattice.nodes[axis] + 1 == lattice.nodes[axis]) return 0;
+  float square = 0;
+  for (int c = 0; c < 3; ++c) {
+    const float apart = nodes[node + stride].mean[c] - nodes[node].mean[c];
+    square += apart * apart;
   }
-  return lattice.per_cell * sqrt(square);
+  return sqrt(square);
 }
-
-// The cell of a place near the hair: its lowest node, and where in it that is [0, 1].
-struct MotionCell {
-  std::int32_t node[3];
-  float along[3];
-
-  RINGLET_KERNEL MotionCell(const MotionLattice& lattice, Vector3<float> at) {
-    const float place[3] = {at.x, at.y, at.z};
-    for (int c = 0; c < 3; ++c) {
-      const float here = max((place[c] - lattice.low[c]) * lattice.per_cell, 0.0f);
-      const std::int32_t last = lattice.nodes[c] - 2;
-      node[c] = here < static_cast<float>(last) ? static_cast<std::int32_t>(here) : last;
-      along[c] = min(here - static_cast<float>(node[c]), 1.0f);
-    }
-  }
-  RINGLET_KERNEL std::int32_t corner(const MotionLattice& lattice, int which) const {
-    return lattice.number(node[0] + (which & 1), node[1] + (which >> 1 & 1), node[2] + (which >> 2));
-  }
-};
 
 // At a place near the hair [m]: between the nodes about it that know.
 RINGLET_KERNEL Vector3<float> mean_motion(const MotionLattice& lattice, const MotionNode* nodes,
                                           Vector3<float> at) {
-  const MotionCell cell(lattice, at);
-  const float* along = cell.along;
+  const float place[3] = {at.x, at.y, at.z};
+  std::int32_t cell[3];
+  float along[3];
+  for (int c = 0; c < 3; ++c) {
+    const float here = max((place[c] - lattice.low[c]) * lattice.per_cell, 0.0f);
+    const std::int32_t last = lattice.nodes[c] - 2;
+    cell[c] = here < static_cast<float>(last) ? static_cast<std::int32_t>(here) : last;
+    along[c] = min(here - static_cast<float>(cell[c]), 1.0f);
+  }
   float weights = 0;
   Vector3<float> mean = zero3<float>();
   for (int corner = 0; corner < 8; ++corner) {
     const int x = corner & 1, y = corner >> 1 & 1, z = corner >> 2;
-    const MotionNode& node = nodes[cell.corner(lattice, corner)];
+    const MotionNode& node = nodes[lattice.number(cell[0] + x, cell[1] + y, cell[2] + z)];
     if (!node.known) continue;
     const float weight =
         (x ? along[0] : 1 - along[0]) * (y ? along[1] : 1 - along[1]) * (z ? along[2] : 1 - along[2]) +

@@ -15,25 +15,21 @@ class MotionField {
     sum_motion(backend, places, extent);
     smooth(backend);
     carry(backend, places);
-    find_slopes(backend, places);
   }
 
   // [particles] where the mean motion takes it from its start to the end; extra: how far it takes the middle
   // of the segment that begins there from the middle of where it takes its ends [m].
   const Place<float>* carried() const { return carried_.data(); }
-  // [particles] How much the mean displacement changes over a distance about the segment that begins there,
-  // at most [-].
-  const float* slope() const { return slope_.data(); }
-  std::size_t bytes() const {
-    return sums_.bytes() + nodes_.bytes() + next_.bytes() + carried_.bytes() + node_slope_.bytes() +
-           slope_.bytes();
-  }
+  // How much the mean displacement changes over a distance in any direction, at most [-].
+  float slope() const { return slope_; }
+  std::size_t bytes() const { return sums_.bytes() + nodes_.bytes() + next_.bytes() + carried_.bytes(); }
 
  private:
   template <class V>
   using Buffer = typename Backend::template Buffer<V>;
   static constexpr int kLatticeCells = 8;   // along the longest axis
-  static constexpr float kSteepest = 0.2f;  // slope that is aimed at [-]
+  static constexpr float kSteepest = 0.1f;  // of a component along an axis, aimed at [-]
+  static constexpr double kFarthest = 1e3;  // that anything moves; what is not a number is left out too [m]
   static constexpr int kSmoothings = 48, kRunChunk = 32;
 
   void sum_motion(Backend& backend, const HairPlaces<T>& places, const HairExtent& extent) {
@@ -51,7 +47,9 @@ class MotionField {
           std::int32_t node = -1;
           MotionSum sum{};
           for (std::int32_t p = run * kRun; p < end; ++p) {
-            if (places.strand[p] < 0 || !extent.holds(float_vector(places.start[p]))) continue;
+            if (places.strand[p] < 0 || !extent.holds(float_vector(places.start[p])) ||
+                !(length(vector_of(places.end[p]) - vector_of(places.start[p])) < T(kFarthest)))
+              continue;
             const std::int32_t here = nearest_node(lattice, places.start[p]);
             if (here != node && node >= 0) add(sums[node], sum), sum = MotionSum{};
             node = here;
@@ -99,6 +97,17 @@ class MotionField {
           [=] RINGLET_LAMBDA(const MotionNode* from, std::int32_t node) {
             return less_steep(lattice, from, node, most);
           });
+    const MotionNode* nodes = nodes_.data();
+    // Between the nodes the mean is trilinear: its slope along an axis is a mean of theirs.
+    float square = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto most_along = static_cast<float>(
+          backend.largest("steepness", lattice.total(), 0, [=] RINGLET_LAMBDA(std::int32_t k) {
+            return static_cast<double>(steepness(lattice, nodes, k, axis));
+          }));
+      square += most_along * most_along;
+    }
+    slope_ = lattice.per_cell * sqrt(square);
   }
 
   void carry(Backend& backend, const HairPlaces<T>& places) {
@@ -119,30 +128,11 @@ class MotionField {
     });
   }
 
-  void find_slopes(Backend& backend, const HairPlaces<T>& places) {
-    node_slope_.resize(lattice_.total()), slope_.resize(places.particles);
-    float *of_node = node_slope_.data(), *slope = slope_.data();
-    const MotionLattice lattice = lattice_;
-    const MotionNode* nodes = nodes_.data();
-    backend.parallel_for("slopes of nodes", lattice.total(), [=] RINGLET_LAMBDA(std::int32_t node) {
-      of_node[node] = slope_at(lattice, nodes, node);
-    });
-    backend.parallel_for("slopes", places.particles, [=] RINGLET_LAMBDA(std::int32_t p) {
-      slope[p] = 0;
-      if (places.strand[p] < 0) return;
-      const MotionCell begin(lattice, float_vector(places.start[p])),
-          end(lattice, float_vector(places.start[p + 1]));
-      for (int corner = 0; corner < 8; ++corner)
-        slope[p] =
-            max(slope[p], max(of_node[begin.corner(lattice, corner)], of_node[end.corner(lattice, corner)]));
-    });
-  }
-
   MotionLattice lattice_{};
+  float slope_ = 0;
   Buffer<MotionSum> sums_;
   Buffer<MotionNode> nodes_, next_;
   Buffer<Place<float>> carried_;
-  Buffer<float> node_slope_, slope_;
 };
 
 }  // namespace RINGLET_ISA

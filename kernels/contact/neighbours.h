@@ -129,7 +129,7 @@ class Neighbours {
     rounds_[round].fill(backend, groups, [&](const PairPool& pool) {
       backend.parallel_for("clear meetings", places.particles,
                            [=] RINGLET_LAMBDA(std::int32_t p) { meetings[p] = 0; });
-      const T far = T(2 * swept.farthest) + 2 * T(kNear) * thickest_;
+      const T far = T(2 * swept.along_both()) + 2 * T(kNear) * thickest_;
       const PairSearch<F, R> search{table, places, far, meetings, hits, pool};
       backend.parallel_for("contact pairs", groups, search, kSearchChunk);
     });

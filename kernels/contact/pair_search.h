@@ -1,5 +1,6 @@
 // Pairs of segments that touch, have crossed, or may do so when others' contacts move them.
 #pragma once
+#include "kernels/backend/words.h"
 #include "kernels/contact/box_table.h"
 #include "kernels/contact/pair_pool.h"
 
@@ -174,7 +175,7 @@ struct PairSearch {
     for (int k = count; k % kPairs; ++k) hits.piece[k] = i;
     for (int k = 0; k < count; k += kPairs) {
       const Others others = others_of(strand, hits.piece + k);
-      hits.total += __builtin_popcount(others.elsewhere);
+      hits.total += ones(others.elsewhere);
       const Segment<R> other_start = gather_segment<R>(places.start, others.segment).places;
       const Mask<R> possible = may_meet(start, other_start, own, others);
       if ((lane_bits(possible) & others.elsewhere) == 0) continue;

@@ -43,5 +43,45 @@ RINGLET_KERNEL bool some(Mask mask) {
   return lane_bits(mask) != 0;
 }
 
+// Writes first + lane for each lane whose bit is set, in order, without a branch: `to` has room for kWidth
+// numbers beyond those. Returns how many there are.
+template <int kWidth>
+RINGLET_KERNEL int append_lanes(std::int32_t* to, std::int32_t first, std::uint32_t bits) {
+  int count = 0;
+  for (int lane = 0; lane < kWidth; ++lane) to[count] = first + lane, count += bits >> lane & 1;
+  return count;
+}
+
+#if !defined(__CUDACC__)
+#if defined(__AVX512F__)
+template <>
+RINGLET_KERNEL int append_lanes<16>(std::int32_t* to, std::int32_t first, std::uint32_t bits) {
+  const __m512i lanes = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+  const __m512i numbers = _mm512_add_epi32(lanes, _mm512_set1_epi32(first));
+  _mm512_storeu_si512(to, _mm512_maskz_compress_epi32(static_cast<__mmask16>(bits), numbers));
+  return __builtin_popcount(bits);
+}
+#elif defined(__AVX2__)
+// For each set of eight lanes the numbers of its lanes, a byte each, the lowest first.
+struct LaneNumbers {
+  std::uint64_t of[256];
+  constexpr LaneNumbers() : of() {
+    for (int bits = 0; bits < 256; ++bits)
+      for (int lane = 0, at = 0; lane < 8; ++lane)
+        if (bits >> lane & 1) of[bits] |= static_cast<std::uint64_t>(lane) << (8 * at++);
+  }
+};
+inline constexpr LaneNumbers kLaneNumbers;
+
+template <>
+RINGLET_KERNEL int append_lanes<8>(std::int32_t* to, std::int32_t first, std::uint32_t bits) {
+  const __m128i bytes = _mm_cvtsi64_si128(static_cast<long long>(kLaneNumbers.of[bits]));
+  const __m256i numbers = _mm256_add_epi32(_mm256_cvtepu8_epi32(bytes), _mm256_set1_epi32(first));
+  _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), numbers);
+  return __builtin_popcount(bits);
+}
+#endif
+#endif
+
 }  // namespace RINGLET_ISA
 }  // namespace ringlet::kernels

@@ -28,12 +28,14 @@ HairExtent find_extent(Backend& backend, const Place<T>* places, const std::int3
                        std::int32_t particles) {
   constexpr double kFar = 4;
   constexpr int kTimes = 3;
-  double middle[3] = {}, most = 1e30;
+  constexpr double kLost = 1e30;  // [m]
+  double middle[3] = {}, most = kLost;
   const auto away = [=] RINGLET_LAMBDA(std::int32_t p, const double* from) {
     double far = 0;
     for (int c = 0; c < 3; ++c) {
-      const double apart = static_cast<double>((&places[p].x)[c]) - from[c];
-      far = max(far, apart < 0 ? -apart : apart);
+      const double apart = static_cast<double>((&places[p].x)[c]) - from[c],
+                   size = apart < 0 ? -apart : apart;
+      far = size < kLost ? max(far, size) : kLost;  // what is not a number is lost too
     }
     return far;
   };
@@ -43,7 +45,7 @@ HairExtent find_extent(Backend& backend, const Place<T>* places, const std::int3
   const auto sum = [&](const auto& values) {
     const Near near{{middle[0], middle[1], middle[2]}, most};
     return backend.sum("hair extent", particles, [=] RINGLET_LAMBDA(std::int32_t p) {
-      return strand[p] >= 0 && away(p, near.middle) <= near.most ? static_cast<double>(values(p)) : 0.0;
+      return strand[p] >= 0 && away(p, near.middle) < near.most ? static_cast<double>(values(p)) : 0.0;
     });
   };
   double segments = 0;
@@ -64,7 +66,7 @@ HairExtent find_extent(Backend& backend, const Place<T>* places, const std::int3
     const auto furthest = [&](double sign) {
       return static_cast<float>(
           sign * backend.largest("hair extent", particles, -1e30, [=] RINGLET_LAMBDA(std::int32_t p) {
-            return strand[p] >= 0 && away(p, near.middle) <= near.most
+            return strand[p] >= 0 && away(p, near.middle) < near.most
                        ? sign * static_cast<double>((&places[p].x)[c])
                        : -1e30;
           }));

@@ -98,13 +98,18 @@ RINGLET_FUNCTION MotionNode less_steep(const MotionLattice& lattice, const Motio
   return moved;
 }
 
-// The largest difference to a neighbour.
-RINGLET_FUNCTION float steepness(const MotionLattice& lattice, const MotionNode* nodes, std::int32_t node) {
-  float most = 0;
-  for_neighbours(lattice, node, [&](std::int32_t other) {
-    for (int c = 0; c < 3; ++c) most = max(most, abs(nodes[other].mean[c] - nodes[node].mean[c]));
-  });
-  return most;
+// How much the mean motion changes from a node to the next along an axis.
+RINGLET_FUNCTION float steepness(const MotionLattice& lattice, const MotionNode* nodes, std::int32_t node,
+                                 int axis) {
+  std::int32_t stride = 1;
+  for (int c = 0; c < axis; ++c) stride *= lattice.nodes[c];
+  if (node / stride % lattice.nodes[axis] + 1 == lattice.nodes[axis]) return 0;
+  float square = 0;
+  for (int c = 0; c < 3; ++c) {
+    const float apart = nodes[node + stride].mean[c] - nodes[node].mean[c];
+    square += apart * apart;
+  }
+  return sqrt(square);
 }
 
 // At a place near the hair [m]: between the nodes about it that know.

@@ -20,7 +20,7 @@ class MotionField {
   // [particles] where the mean motion takes it from its start to the end; extra: how far it takes the middle
   // of the segment that begins there from the middle of where it takes its ends [m].
   const Place<float>* carried() const { return carried_.data(); }
-  // How much the mean displacement changes over a distance, at most [-].
+  // How much the mean displacement changes over a distance in any direction, at most [-].
   float slope() const { return slope_; }
   std::size_t bytes() const { return sums_.bytes() + nodes_.bytes() + next_.bytes() + carried_.bytes(); }
 
@@ -28,7 +28,8 @@ class MotionField {
   template <class V>
   using Buffer = typename Backend::template Buffer<V>;
   static constexpr int kLatticeCells = 8;   // along the longest axis
-  static constexpr float kSteepest = 0.2f;  // slope that is aimed at [-]
+  static constexpr float kSteepest = 0.1f;  // of a component along an axis, aimed at [-]
+  static constexpr double kFarthest = 1e3;  // that anything moves; what is not a number is left out too [m]
   static constexpr int kSmoothings = 48, kRunChunk = 32;
 
   void sum_motion(Backend& backend, const HairPlaces<T>& places, const HairExtent& extent) {
@@ -46,7 +47,9 @@ class MotionField {
           std::int32_t node = -1;
           MotionSum sum{};
           for (std::int32_t p = run * kRun; p < end; ++p) {
-            if (places.strand[p] < 0 || !extent.holds(float_vector(places.start[p]))) continue;
+            if (places.strand[p] < 0 || !extent.holds(float_vector(places.start[p])) ||
+                !(length(vector_of(places.end[p]) - vector_of(places.start[p])) < T(kFarthest)))
+              continue;
             const std::int32_t here = nearest_node(lattice, places.start[p]);
             if (here != node && node >= 0) add(sums[node], sum), sum = MotionSum{};
             node = here;
@@ -95,10 +98,16 @@ class MotionField {
             return less_steep(lattice, from, node, most);
           });
     const MotionNode* nodes = nodes_.data();
-    slope_ = lattice.per_cell * static_cast<float>(backend.largest(
-                                    "steepness", lattice.total(), 0, [=] RINGLET_LAMBDA(std::int32_t k) {
-                                      return static_cast<double>(steepness(lattice, nodes, k));
-                                    }));
+    // Between the nodes the mean is trilinear: its slope along an axis is a mean of theirs.
+    float square = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto most_along = static_cast<float>(
+          backend.largest("steepness", lattice.total(), 0, [=] RINGLET_LAMBDA(std::int32_t k) {
+            return static_cast<double>(steepness(lattice, nodes, k, axis));
+          }));
+      square += most_along * most_along;
+    }
+    slope_ = lattice.per_cell * sqrt(square);
   }
 
   void carry(Backend& backend, const HairPlaces<T>& places) {

@@ -1,5 +1,6 @@
 // Pairs of segments that touch, have crossed, or may do so when others' contacts move them.
 #pragma once
+#include "kernels/backend/words.h"
 #include "kernels/contact/box_table.h"
 #include "kernels/contact/pair_pool.h"
 
@@ -50,9 +51,9 @@ struct PairSearch {
   // The pieces whose boxes one piece's box meets.
   struct Hits {
     static constexpr int kRoom = 256;
-    std::int32_t segment[kRoom], piece[kRoom];
+    std::int32_t piece[kRoom + kBoxes];
     int count = 0;
-    std::int32_t total = 0;
+    std::int32_t total = 0;  // of other strands
   };
   // Pairs of pieces waiting until there are enough for a pack.
   struct Suspects {
@@ -116,10 +117,11 @@ struct PairSearch {
         if (from <= i && i < to) from = i + 1;
         for (std::int32_t j = from & ~(kBoxes - 1); j < to; j += kBoxes) {
           std::uint32_t near = lane_bits(overlaps(box, j));
-          if (near == 0) continue;
           if (j < from) near &= ~0u << (from - j);
           if (to - j < kBoxes) near &= ~(~0u << (to - j));
-          for (; near; near &= near - 1) hit(i, j + __builtin_ctz(near), work);
+          Hits& hits = work.hits;
+          hits.count += append_lanes<kBoxes>(hits.piece + hits.count, j, near);
+          if (hits.count > Hits::kRoom - kBoxes) sift(i, work);
         }
       }
       sift(i, work);
@@ -140,12 +142,22 @@ struct PairSearch {
            (corner(2, j) <= F(box.high[2])) & (F(box.low[2]) <= corner(5, j));
   }
 
-  RINGLET_KERNEL void hit(std::int32_t i, std::int32_t j, Work& work) const {
-    Hits& hits = work.hits;
-    const std::int32_t segment = table.piece[j].segment;
-    if (places.strand[segment] == places.strand[table.piece[i].segment]) return;
-    hits.segment[hits.count] = segment, hits.piece[hits.count] = j;
-    if (++hits.count == Hits::kRoom) sift(i, work);
+  // Of a pack of hits.
+  struct Others {
+    alignas(64) std::int32_t segment[kPairs];
+    alignas(64) T from[kPairs], to[kPairs], stray[kPairs];
+    std::uint32_t elsewhere = 0;  // a bit for each that is not on the strand itself
+  };
+
+  RINGLET_KERNEL Others others_of(std::int32_t strand, const std::int32_t* pieces) const {
+    Others others;
+    for (int lane = 0; lane < kPairs; ++lane) {
+      const Piece& piece = table.piece[pieces[lane]];
+      others.segment[lane] = piece.segment, others.from[lane] = piece.from, others.to[lane] = piece.to;
+      others.stray[lane] = piece.stray;
+      others.elsewhere |= (places.strand[piece.segment] != strand ? 1u : 0u) << lane;
+    }
+    return others;
   }
 
   // Leaves those hits of a piece that may be pairs, and forgets them: where the lines of the segments have
@@ -153,24 +165,28 @@ struct PairSearch {
   RINGLET_FUNCTION void sift(std::int32_t i, Work& work) const {
     Hits& hits = work.hits;
     const int count = hits.count;
-    hits.count = 0, hits.total += count;
+    hits.count = 0;
     if (count == 0) return;
-    const std::int32_t own = table.piece[i].segment;
-    const Segment<R> start = segment_at<R>(places.start, own), end = segment_at<R>(places.end, own);
-    const R radius(thickest(places.end, own));
-    for (int k = count; k % kPairs; ++k) hits.segment[k] = hits.segment[0], hits.piece[k] = hits.piece[0];
+    const Piece& own = table.piece[i];
+    const Segment<R> start = segment_at<R>(places.start, own.segment),
+                     end = segment_at<R>(places.end, own.segment);
+    const R radius(thickest(places.end, own.segment));
+    const std::int32_t strand = places.strand[own.segment];
+    for (int k = count; k % kPairs; ++k) hits.piece[k] = i;
     for (int k = 0; k < count; k += kPairs) {
-      const Segment<R> other_start = gather_segment<R>(places.start, hits.segment + k).places;
-      const Mask<R> possible = may_meet(start, other_start, i, hits.piece + k);
-      if (!some(possible)) continue;
-      const GatheredSegment<R> other = gather_segment<R>(places.end, hits.segment + k);
+      const Others others = others_of(strand, hits.piece + k);
+      hits.total += ones(others.elsewhere);
+      const Segment<R> other_start = gather_segment<R>(places.start, others.segment).places;
+      const Mask<R> possible = may_meet(start, other_start, own, others);
+      if ((lane_bits(possible) & others.elsewhere) == 0) continue;
+      const GatheredSegment<R> other = gather_segment<R>(places.end, others.segment);
       const R near = R(T(kNear)) * (radius + max(other.begin_extra, other.end_extra));
       std::uint32_t left =
-          lane_bits(possible & on_other_side_or_near(start, end, other_start, other.places, near));
-      if (count - k < kPairs) left &= ~(~0u << (count - k));
+          lane_bits(possible & on_other_side_or_near(start, end, other_start, other.places, near)) &
+          others.elsewhere;
       for (; left; left &= left - 1) {
-        const int at = k + __builtin_ctz(left);
-        suspect(own, hits.segment[at], i, hits.piece[at], work);
+        const int lane = __builtin_ctz(left);
+        suspect(own.segment, others.segment[lane], i, hits.piece[k + lane], work);
       }
     }
   }
@@ -186,23 +202,17 @@ struct PairSearch {
 
   // Whether the lines at the start are so near that they can have met, on the pieces, before either had gone
   // as far as it is looked for.
-  RINGLET_KERNEL Mask<R> may_meet(const Segment<R>& a, const Segment<R>& b, std::int32_t i,
-                                  const std::int32_t* pieces) const {
+  RINGLET_KERNEL Mask<R> may_meet(const Segment<R>& a, const Segment<R>& b, const Piece& own,
+                                  const Others& others) const {
     const LineProducts<R> lines(a.along(), b.along(), b.begin - a.begin);
     const R sine2 = fma(parallel_sine2<R>() * lines.uu, lines.ww, lines.determinant);
-    const Piece& own = table.piece[i];
-    alignas(64) T from[kPairs], to[kPairs], stray[kPairs];
-    for (int lane = 0; lane < kPairs; ++lane) {
-      const Piece& piece = table.piece[pieces[lane]];
-      from[lane] = piece.from, to[lane] = piece.to, stray[lane] = piece.stray;
-    }
-    const R most = R(far + T(own.stray)) + load<R>(stray), volume = tetrahedron_volume(a, b);
+    const R most = R(far + T(own.stray)) + load<R>(others.stray), volume = tetrahedron_volume(a, b);
     // Places shift by the distance over the sine of the angle.
     const R per_sine = most * inverse_or_zero(sqrt(lines.determinant), R(T(1e-18)));
     const R s = lines.s(), u = lines.u(), shift_a = per_sine * sqrt(lines.ww),
             shift_b = per_sine * sqrt(lines.uu);
     const Mask<R> on_a = (R(T(own.from)) - shift_a <= s) & (s <= R(T(own.to)) + shift_a),
-                  on_b = (load<R>(from) - shift_b <= u) & (u <= load<R>(to) + shift_b);
+                  on_b = (load<R>(others.from) - shift_b <= u) & (u <= load<R>(others.to) + shift_b);
     const Mask<R> parallel = lines.determinant <= R(T(1e-4)) * lines.uu * lines.ww;
     return (volume * volume <= most * most * sine2) & (parallel | (on_a & on_b));
   }

@@ -43,28 +43,45 @@ struct FindStanding {
  private:
   static constexpr int kAround = 2;  // segments that a crossing may have slid along
 
-  // The nearest along the strands.
+  // Follows the crossing of the strands from two of their segments to the two that it is on now. Where that
+  // leads nowhere, among segments that are parallel or bent, the nearest of all pairs about is taken.
   RINGLET_FUNCTION void write(std::int32_t a, std::int32_t b, bool negative) const {
+    std::int32_t one = a, other = b;
+    for (int step = 0; step <= 2 * kAround; ++step) {
+      const Segment<T> here = segment_at<T>(places.end, one), there = segment_at<T>(places.end, other);
+      const LineProducts<T> products(here.along(), there.along(), there.begin - here.begin);
+      if (products.determinant <= parallel_sine2<T>() * (products.uu * products.ww)) break;
+      const T s = products.s(), u = products.u();
+      const bool reached = within_unit(s) && within_unit(u);
+      if (reached && (tetrahedron_volume(here, there) < T(0)) == negative) return;  // on their own sides
+      if (reached && write_cut(one, other, negative)) return;
+      if (reached) break;
+      one += beyond(s), other += beyond(u);
+      if (!near_on_strand(a, one) || !near_on_strand(b, other)) return;
+    }
     for (int far = 0; far <= kAround; ++far)
       for (int i = -far; i <= far; ++i)
-        for (int j = -far; j <= far; ++j) {
-          if (i != far && i != -far && j != far && j != -far) continue;
-          const std::int32_t one = a + i, other = b + j;
-          if (!places.on_one_strand(a, one) || !places.on_one_strand(b, other) || !cut(one, other, negative))
-            continue;
-          const std::int32_t at = atomic_add(count, 1);
-          if (at < room) found[at] = key.key(one, other, negative ? PairKey::kNegative : PairKey::kPositive);
-          return;
-        }
+        for (int j = -far; j <= far; ++j)
+          if ((i == far || i == -far || j == far || j == -far) && near_on_strand(a, a + i) &&
+              near_on_strand(b, b + j) && write_cut(a + i, b + j, negative))
+            return;
   }
-  RINGLET_KERNEL bool cut(std::int32_t a, std::int32_t b, bool negative) const {
+  RINGLET_KERNEL static std::int32_t beyond(T place) { return place < T(0) ? -1 : place > T(1) ? 1 : 0; }
+  RINGLET_KERNEL bool near_on_strand(std::int32_t from, std::int32_t segment) const {
+    return segment - from <= kAround && from - segment <= kAround && places.on_one_strand(from, segment);
+  }
+  // If the two cut through one another.
+  RINGLET_FUNCTION bool write_cut(std::int32_t a, std::int32_t b, bool negative) const {
     const Segment<T> one = segment_at<T>(places.end, a), other = segment_at<T>(places.end, b);
     if ((tetrahedron_volume(one, other) < T(0)) == negative) return false;
     const LineProducts<T> products(one.along(), other.along(), other.begin - one.begin);
     if (products.determinant <= parallel_sine2<T>() * (products.uu * products.ww)) return false;
     const PairContact<T> contact =
         standing_contact(SegmentPair<T>{one, other, one, other}, products, negative ? T(-1) : T(1));
-    return contact.crossed && -contact.distance < deepest;
+    if (!contact.crossed || !(-contact.distance < deepest)) return false;
+    const std::int32_t at = atomic_add(count, 1);
+    if (at < room) found[at] = key.key(a, b, negative ? PairKey::kNegative : PairKey::kPositive);
+    return true;
   }
 };
 

@@ -31,32 +31,28 @@ class FilteredConjugateGradients {
 
   std::size_t bytes() const { return 8 * residual_.bytes(); }
 
-  // x, from `b` and a matrix that is factored with the filter. The residual that counts is the true one, b -
-  // A x in the Euclidean norm: where rounding has led the iteration's astray, it goes on from there.
+  // x, from `b` and a matrix that is factored with the filter. Residuals r count as r . D^-1 r, as Baraff and
+  // Witkin weight them with the inverse of the matrix' diagonal: what float's rounding of stiff hair's x
+  // makes of them stays small. The one that counts is the true one, b - A x: where rounding has led the
+  // iteration's astray, it goes on from there.
   template <class Matrix>
   SolveFigures solve(const Matrix& a, const VertexFilter<T>& filter, T tolerance, std::int32_t iterations,
                      const Padded<T>* b, Padded<T>* x) {
     Padded<T>* r = vectors(left_);
     SolveFigures figures;
-    Padded<T> squares{};
     for_rows(a, [&](std::int32_t i) {
       x[i] = Padded<T>{}, vectors(product_)[i] = Padded<T>{};
-      r[i] = filter.keep(i, b[i]), squares += r[i] * r[i];
+      r[i] = filter.keep(i, b[i]);
     });
-    const T first = sum(squares);
-    T left = first;
-    const T goal = tolerance * tolerance * first;
-    T last = T(8) * first;
+    const T first = weighted_square(a, r), goal = tolerance * tolerance * first;
+    T left = first, last = T(8) * first;
     // Rounding ends what goes on for too long.
     while (left > goal && left < T(0.25) * last && figures.iterations < iterations) {
       last = left;
-      iterate(a, filter, goal, iterations, r, x, figures);
+      iterate(a, filter, goal, left, iterations, r, x, figures);
       multiply(a, x, vectors(product_));
-      squares = Padded<T>{};
-      for_rows(a, [&](std::int32_t i) {
-        r[i] = filter.keep(i, b[i] - vectors(product_)[i]), squares += r[i] * r[i];
-      });
-      left = sum(squares);
+      for_rows(a, [&](std::int32_t i) { r[i] = filter.keep(i, b[i] - vectors(product_)[i]); });
+      left = weighted_square(a, r);
     }
     figures.residual = static_cast<double>(first > 0 ? sqrt(left / first) : first);
     return figures;
@@ -73,8 +69,6 @@ class FilteredConjugateGradients {
   }
 
  private:
-  static constexpr T kHope = 8;  // of the Euclidean norm's square being ahead
-
   static Padded<T>* vectors(const HostBuffer<T>& buffer) {
     return reinterpret_cast<Padded<T>*>(buffer.data());
   }
@@ -85,15 +79,15 @@ class FilteredConjugateGradients {
       for (std::int32_t i = a.first_row(c); i < a.end_row(c); ++i) f(i);
   }
 
-  // Adds to x until the square of the residual, which is `b` at the start, is down to `goal`. What the
-  // preconditioner makes of the residual is at hand, its Euclidean norm costs a third of an iteration: it is
-  // looked at when the other's progress gives reason to hope.
+  // Adds to x until the weighted square of the residual, `left` for `b` at the start, is down to `goal`. What
+  // the preconditioner makes of the residual is at hand, this costs half an iteration: it is looked at when
+  // the other has come down as far.
   template <class Matrix>
-  void iterate(const Matrix& a, const VertexFilter<T>& filter, T goal, std::int32_t iterations,
+  void iterate(const Matrix& a, const VertexFilter<T>& filter, T goal, T left, std::int32_t iterations,
                const Padded<T>* b, Padded<T>* x, SolveFigures& figures) {
     Padded<T>*r = vectors(residual_), *z = vectors(scaled_), *q = vectors(earlier_);
     T rho = start(a, filter, b), beta = 0;
-    T look = kHope * rho * (goal / euclidean_square(a, filter));
+    T look = rho * (goal / left);
     while (rho > 0 && figures.iterations < iterations) {
       sweep_back(a, filter, beta);
       const T bend = sweep_forward(a, filter);
@@ -110,23 +104,32 @@ class FilteredConjugateGradients {
       beta = next / rho, rho = next;
       ++figures.iterations;
       if (rho > look) continue;
-      const T square = euclidean_square(a, filter);
+      const T square = weighted_residual(a, filter);
       if (!(square > goal)) break;
       look = rho * max(goal / square, T(0.01));
     }
   }
 
-  // |z + L r|^2, the square of the residual b - A x.
+  // Of the residual b - A x = z + L r.
   template <class Matrix>
-  T euclidean_square(const Matrix& a, const VertexFilter<T>& filter) {
+  T weighted_residual(const Matrix& a, const VertexFilter<T>& filter) {
     Padded<T>*r = vectors(residual_), *z = vectors(scaled_), *sums = vectors(later_);
     for_rows(a, [&](std::int32_t i) { sums[i] = Padded<T>{}; });
-    for (std::int32_t c = 0; c < a.columns(); ++c) a.add_to_later_columns(c, r, sums);
+    for (std::int32_t c = 0; c < a.columns(); ++c) {
+      a.add_to_later_columns(c, r, sums);
+      for (std::int32_t i = a.first_row(c); i < a.end_row(c); ++i) sums[i] = z[i] + filter.keep(i, sums[i]);
+    }
+    return weighted_square(a, sums);
+  }
+  // b . D^-1 b
+  template <class Matrix>
+  T weighted_square(const Matrix& a, const Padded<T>* b) {
+    Padded<T>* solved = vectors(earlier_);
     Padded<T> squares{};
-    for_rows(a, [&](std::int32_t i) {
-      const Padded<T> left = z[i] + filter.keep(i, sums[i]);
-      squares += left * left;
-    });
+    for (std::int32_t c = 0; c < a.columns(); ++c) {
+      a.solve_column(c, b, solved);
+      for (std::int32_t i = a.first_row(c); i < a.end_row(c); ++i) squares += b[i] * solved[i];
+    }
     return sum(squares);
   }
 

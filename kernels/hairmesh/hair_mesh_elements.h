@@ -29,7 +29,9 @@ struct HairMeshParameters {
 // What a solve took.
 struct SolveFigures {
   std::int32_t iterations = 0;
-  double residual = 0;  // |S (b - A x)| over the same at the start, where x is as prescribed
+  // Of r = S (b - A x), the root of r . D^-1 r over the same at the start, where x is as prescribed; D holds
+  // the matrix' blocks in each column of the mesh.
+  double residual = 0;
 };
 
 // C = |x1 - x0| / length - 1

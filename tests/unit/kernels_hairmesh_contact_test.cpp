@@ -39,7 +39,7 @@ TEST(HairMeshEllipsoid, NearestPointIsOnItAlongItsNormalAndNearest) {
       if (n % 20 == 0) inside[1] = 0;
       if (n == 100) inside.setZero();
       const Vec3 local = radius.cwiseProduct(inside), point = vec(e.centre) + axes * local;
-      MeshSurfacePoint<double> found;
+      MeshSurfacePoint<double> found{};
       ASSERT_TRUE(kernels::find_on_ellipsoid(e, point.data(), 0.0, found));
       const Vec3 on = axes.transpose() * (vec(found.point) - vec(e.centre)), unit = on.cwiseQuotient(radius);
       EXPECT_NEAR(unit.norm(), 1, 1e-12);
@@ -55,7 +55,7 @@ TEST(HairMeshEllipsoid, NearestPointIsOnItAlongItsNormalAndNearest) {
         EXPECT_GE((sample - local).norm(), depth - 1e-9);
       }
     }
-    MeshSurfacePoint<double> found;
+    MeshSurfacePoint<double> found{};
     const Vec3 outside = vec(e.centre) + axes * Vec3(0, 0, radius[2] + 1e-3);
     EXPECT_FALSE(kernels::find_on_ellipsoid(e, outside.data(), 0.0, found));
     EXPECT_TRUE(kernels::find_on_ellipsoid(e, outside.data(), 2e-3, found));
@@ -66,7 +66,7 @@ TEST(HairMeshEllipsoid, NearestPointIsOnItAlongItsNormalAndNearest) {
 TEST(HairMeshEllipsoid, ItsSurfaceMovesAsARigidBodyDoes) {
   MeshEllipsoid<double> e = ellipsoid({0, 1, 0}, {0.1, 0.1, 0.1}, Eigen::Matrix3d::Identity());
   e.velocity[0] = 2, e.spin[1] = 3;
-  MeshSurfacePoint<double> found;
+  MeshSurfacePoint<double> found{};
   const Vec3 point(0, 1, 0.05);
   ASSERT_TRUE(kernels::find_on_ellipsoid(e, point.data(), 0.0, found));
   EXPECT_LE((vec(found.velocity) - Vec3(2 + 3 * 0.1, 0, 0)).norm(), 1e-14);

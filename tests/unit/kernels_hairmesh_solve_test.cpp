@@ -72,7 +72,8 @@ TEST(HairMeshSolve, AgreesWithADenseSolveAndKeepsWhatIsPrescribed) {
                                 t.vertex(9, layers - 1)};
     std::vector<kernels::MeshContact<double>> contacts;
     for (const int v : held) {
-      kernels::MeshContact<double> contact{v, {}, {}, 0};
+      kernels::MeshContact<double> contact{};
+      contact.vertex = v;
       for (int k = 0; k < 3; ++k) contact.normal[k] = normal[k], contact.velocity[k] = surface[k];
       contacts.push_back(contact);
     }

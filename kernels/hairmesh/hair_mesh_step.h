@@ -136,6 +136,9 @@ class MeshStepper final : public HairMeshSolver<T> {
     if (corrected_count_ == 0) return {};
     filter_.clear();
     for (std::int32_t k = 0; k < corrected_count_; ++k) filter_.prescribe_wholly(corrected_.data()[k]);
+    // What touches without having been moved stays where it is as well.
+    for (std::int32_t k = 0; k < contact_count_; ++k)
+      if (filter_.is_free(contacts_.data()[k].vertex)) filter_.prescribe_wholly(contacts_.data()[k].vertex);
     laplacian_.factor(filter_);
     // From what the correction alone leaves; beside it the solve finds what the others do.
     Padded<T>*u = vectors(displacement_), *left = vectors(impulse_), *w = vectors(change_);
@@ -201,7 +204,8 @@ class MeshStepper final : public HairMeshSolver<T> {
   const Padded<T>* change() const { return vectors(change_); }
 
  private:
-  enum Held : char { kFree, kSlides, kSticks };
+  // kReleased: its surface had to hold it back in this step, which no surface does.
+  enum Held : char { kFree, kSlides, kSticks, kReleased };
 
   static Padded<T>* vectors(const HostBuffer<T>& buffer) {
     return reinterpret_cast<Padded<T>*>(buffer.data());
@@ -248,7 +252,7 @@ class MeshStepper final : public HairMeshSolver<T> {
     const Padded<T> n = padded(contact.normal),
                     held = carried + (gradients_.product()[i] - vectors(impulse_)[i]);
     const T push = dot_product(n, held);
-    held_.data()[i] = kFree;
+    held_.data()[i] = kReleased;
     if (!(push > T(0))) return;
     Padded<T> direction;  // of friction
     if (contact.sticks) {
@@ -275,7 +279,8 @@ class MeshStepper final : public HairMeshSolver<T> {
       MeshSurfacePoint<T> found;
       T point[3];
       store_three(point, position()[i]);
-      if (!find(point, held_.data()[i] != kFree ? reach_ : T(0), found)) continue;
+      const bool held = held_.data()[i] == kSlides || held_.data()[i] == kSticks;
+      if (!find(point, held ? reach_ : T(0), found)) continue;
       const Padded<T> n = padded(found.normal), out = padded(found.point) - position()[i];
       const T depth = dot_product(n, out);
       ++figures.touched;
@@ -283,6 +288,9 @@ class MeshStepper final : public HairMeshSolver<T> {
         ++figures.corrected, figures.depth = max(figures.depth, static_cast<double>(depth));
         correct(i, out);
       }
+      // One that was let go comes anew only where it moves into the surface: rounding may leave it inside.
+      if (held_.data()[i] == kReleased && !(dot_product(velocity()[i] - padded(found.velocity), n) < T(0)))
+        continue;
       velocity()[i] = velocity_after_contact<T>(velocity()[i], padded(found.velocity), n, found.friction);
       hold(i, found);
     }
@@ -302,7 +310,7 @@ class MeshStepper final : public HairMeshSolver<T> {
     for (int c = 0; c < 3; ++c) contact.normal[c] = found.normal[c], contact.velocity[c] = found.velocity[c];
     if (held_.data()[i] == kSlides) store_three(contact.force, vectors(rubbing_)[i]);
     // Friction stopped one that has come anew.
-    if (held_.data()[i] == kFree)
+    if (held_.data()[i] != kSlides && held_.data()[i] != kSticks)
       contact.sticks = found.friction > T(0) && square(velocity()[i] - padded(found.velocity)) == T(0);
     keep(contact);
   }

@@ -234,6 +234,9 @@ void HairMeshSimulation<T>::step_frame(int frame) {
 
 template <class T>
 void HairMeshSimulation<T>::check(int frame) {
+  if (!std::isfinite(taken_.residual) || !std::isfinite(taken_.minimise_residual))
+    throw Diverged(frame_now(frame), "solve", parts_[0].first_strand, -1,
+                   "the simulation diverged: a hair mesh's solve has no finite residual");
   for (std::size_t k = 0; k < parts_.size(); ++k) {
     const auto diverged = parts_[k].body.diverged(scene_.limits);
     if (!diverged) continue;

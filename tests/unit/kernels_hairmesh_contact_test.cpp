@@ -132,6 +132,40 @@ TEST(HairMeshContact, AMeshOnASlopeSticksOrSlides) {
   }
 }
 
+// What friction has held leaves at once when it is pulled off, wherever rounding has left it.
+TEST(HairMeshContact, AMeshThatIsPulledOffItsGroundLeavesIt) {
+  HairMeshParameters parameters;
+  parameters.held_roots = false, parameters.drag = 0;
+  MeshRun<float> run(prism_column(4, 3, 0.1, 0.1), parameters);
+  const float ground = 0.37F;
+  const auto find = [&](const float* point, float reach, MeshSurfacePoint<float>& found) {
+    if (!(point[1] - ground < reach)) return false;
+    found = {{point[0], ground, point[2]}, {0, 1, 0}, {0, 0, 0}, 0.8F};
+    return true;
+  };
+  Eigen::Matrix3d upside_down = Eigen::Vector3d(1, -1, -1).asDiagonal();
+  for (int v = 0; v < run.vertices(); ++v)
+    run.put(v, upside_down * (run.mesh.at(v) - Vec3(0, 0.1, 0)) + Vec3(0, ground, 0));
+  run.set();
+  const auto lowest = [&] {
+    double low = 1e9;
+    for (int v = 0; v < run.vertices(); ++v) low = std::min(low, run.at(v).y() - ground);
+    return low;
+  };
+  const auto stand = [&](int frames) {
+    for (int frame = 0; frame < frames; ++frame) {
+      run.frame();
+      run.solver->collide(kernels::mesh_surface<float>(find)), run.solver->minimise();
+    }
+    run.get();
+  };
+  stand(48);
+  ASSERT_NEAR(lowest(), 0, 1e-5);
+  run.step.gravity[1] = 9.81F;
+  stand(6);  // in which it rises by at least h^2 g (1 + ... + 5)
+  EXPECT_GT(lowest(), 0.5 * 9.81 * 15 / (24.0 * 24.0));
+}
+
 // A ball that drives into a hanging lock within one frame and stays moves far the vertices that it meets.
 // With the rest of the mesh taken along the volume is all there two frames later; without, inner vertices are
 // left in the ball, and the volume force takes longer to get them out.

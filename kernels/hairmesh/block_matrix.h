@@ -97,16 +97,18 @@ class BlockMatrix {
     Padded<T> one{}, two{}, block[3];  // those of the two rows before, or after
     for (std::int32_t i = begin; i < end; ++i) {
       Padded<T> w = g[i];
-      if (i > begin + 1) load_packed(factor_of(i, kTwice), block), w -= transpose_times(block, two);
-      if (i > begin) load_packed(factor_of(i, kOnce), block), w -= transpose_times(block, one);
+      if (i > begin + 1) load_packed(factor_of(i, kTwice), block), w = less_transpose_times(w, block, two);
+      if (i > begin) load_packed(factor_of(i, kOnce), block), w = less_transpose_times(w, block, one);
       two = one, one = w;
       load_packed(factor_of(i, kInverse), block);
       x[i] = block_times(block, w);
     }
     for (std::int32_t i = end - 1; i >= begin; --i) {
       Padded<T> value = x[i];
-      if (i + 2 < end) load_packed(factor_of(i + 2, kTwice), block), value -= block_times(block, x[i + 2]);
-      if (i + 1 < end) load_packed(factor_of(i + 1, kOnce), block), value -= block_times(block, x[i + 1]);
+      if (i + 2 < end)
+        load_packed(factor_of(i + 2, kTwice), block), value = less_block_times(value, block, x[i + 2]);
+      if (i + 1 < end)
+        load_packed(factor_of(i + 1, kOnce), block), value = less_block_times(value, block, x[i + 1]);
       x[i] = value;
     }
   }
@@ -115,53 +117,17 @@ class BlockMatrix {
   RINGLET_KERNEL void later_columns(std::int32_t column, const Padded<T>* x, Padded<T>* y) const {
     const Bands bands = bands_of(column);
     const Octets* block = bands.blocks;
-    for (std::int32_t i = first_row(column); i < end_row(column); i += 2) {
-      const Padded<T>* beside = x + (i - column * layers_);
-      Octets a{}, b{}, c{};
-      const auto add = [&](const Padded<T>* from) {
-        const Octets v = load_two(from);
-        a += block[0] * spread_halves<0>(v);
-        b += block[1] * spread_halves<1>(v);
-        c += block[2] * spread_halves<2>(v);
-        block += 3;
-      };
-      for (const std::int32_t* other = bands.sloping; other < bands.level; ++other) {
-        const Padded<T>* from = beside + *other * layers_;
-        add(from - 1), add(from), add(from + 1);
-      }
-      for (const std::int32_t* other = bands.level; other < bands.end; ++other)
-        add(beside + *other * layers_);
-      const Octets sum = a + b + c;
-      y[i] = first_half<T>(sum);
-      if (i + 1 < end_row(column)) y[i + 1] = second_half<T>(sum);
-    }
+    std::int32_t i = first_row(column);
+    for (; i + 2 < end_row(column); i += 4) block = later_rows<2>(column, bands, block, i, x, y);
+    if (i < end_row(column)) later_rows<1>(column, bands, block, i, x, y);
   }
   // to += what one column of x adds to L x
   RINGLET_KERNEL void add_to_later_columns(std::int32_t column, const Padded<T>* x, Padded<T>* to) const {
     const Bands bands = bands_of(column);
     const Octets* block = bands.blocks;
-    for (std::int32_t i = first_row(column); i < end_row(column); i += 2) {
-      Padded<T>* beside = to + (i - column * layers_);
-      const Octets v = load_two(x + i);
-      const auto next = [&] {
-        const Octets sum = transposes_times(block[0], block[1], block[2], v);
-        block += 3;
-        return sum;
-      };
-      for (const std::int32_t* other = bands.sloping; other < bands.level; ++other) {
-        Padded<T>* at = beside + *other * layers_;
-        const Octets down = next(), level = next(), up = next();
-        at[-1] += first_half<T>(down);
-        at[0] += second_half<T>(down) + first_half<T>(level);
-        at[1] += second_half<T>(level) + first_half<T>(up);
-        at[2] += second_half<T>(up);
-      }
-      for (const std::int32_t* other = bands.level; other < bands.end; ++other) {
-        Padded<T>* at = beside + *other * layers_;
-        const Octets level = next();
-        at[0] += first_half<T>(level), at[1] += second_half<T>(level);
-      }
-    }
+    std::int32_t i = first_row(column);
+    for (; i + 2 < end_row(column); i += 4) block = add_rows<2>(column, bands, block, i, x, to);
+    if (i < end_row(column)) add_rows<1>(column, bands, block, i, x, to);
   }
   // y += D x in one column, without the filter
   RINGLET_KERNEL void own_column(std::int32_t column, const Padded<T>* x, Padded<T>* y) const {
@@ -184,7 +150,7 @@ class BlockMatrix {
   // A column's bands with later ones.
   struct Bands {
     const std::int32_t *sloping, *level, *end;
-    const Octets* blocks;  // for each two rows, those of all bands
+    const Octets* blocks;  // for each four rows, and what is left of them, those of all bands
   };
   RINGLET_KERNEL Bands bands_of(std::int32_t column) const {
     const std::int32_t* first = first_.data() + 2 * std::int64_t{column};
@@ -192,6 +158,62 @@ class BlockMatrix {
     return {other_.data() + first[0], other_.data() + first[1], other_.data() + first[2],
             reinterpret_cast<const Octets*>(values_.data() +
                                             (own_pairs + first_pair_.data()[column]) * kPairReals)};
+  }
+  // Rows from i of the products, so many pairs of them together; return the blocks of those after.
+  template <int kPairs>
+  RINGLET_KERNEL const Octets* later_rows(std::int32_t column, const Bands& bands, const Octets* block,
+                                          std::int32_t i, const Padded<T>* x, Padded<T>* y) const {
+    const Padded<T>* beside = x + (i - column * layers_);
+    Octets a[kPairs]{}, b[kPairs]{}, c[kPairs]{};
+    const auto add = [&](const Padded<T>* from) {
+      for (int k = 0; k < kPairs; ++k, block += 3) {
+        const Octets v = load_two(from + 2 * k);
+        a[k] += block[0] * spread_halves<0>(v);
+        b[k] += block[1] * spread_halves<1>(v);
+        c[k] += block[2] * spread_halves<2>(v);
+      }
+    };
+    for (const std::int32_t* other = bands.sloping; other < bands.level; ++other) {
+      const Padded<T>* from = beside + *other * layers_;
+      add(from - 1), add(from), add(from + 1);
+    }
+    for (const std::int32_t* other = bands.level; other < bands.end; ++other) add(beside + *other * layers_);
+    for (int k = 0; k < kPairs; ++k) {
+      const Octets sum = a[k] + b[k] + c[k];
+      y[i + 2 * k] = first_half<T>(sum);
+      if (k + 1 < kPairs || i + 2 * k + 1 < end_row(column)) y[i + 2 * k + 1] = second_half<T>(sum);
+    }
+    return block;
+  }
+  template <int kPairs>
+  RINGLET_KERNEL const Octets* add_rows(std::int32_t column, const Bands& bands, const Octets* block,
+                                        std::int32_t i, const Padded<T>* x, Padded<T>* to) const {
+    Padded<T>* beside = to + (i - column * layers_);
+    Octets v[kPairs];
+    for (int k = 0; k < kPairs; ++k) v[k] = load_two(x + i + 2 * k);
+    const auto product = [&](int k, int band) {
+      const Octets* at = block + 3 * (kPairs * band + k);
+      return transposes_times(at[0], at[1], at[2], v[k]);
+    };
+    for (const std::int32_t* other = bands.sloping; other < bands.level;
+         ++other, block += 3 * kPairs * kSlopes) {
+      Padded<T>* at = beside + *other * layers_;
+      for (int k = 0; k < kPairs; ++k, at += 2) {
+        const Octets down = product(k, 0), level = product(k, 1), up = product(k, 2);
+        at[-1] += first_half<T>(down);
+        at[0] += second_half<T>(down) + first_half<T>(level);
+        at[1] += second_half<T>(level) + first_half<T>(up);
+        at[2] += second_half<T>(up);
+      }
+    }
+    for (const std::int32_t* other = bands.level; other < bands.end; ++other, block += 3 * kPairs) {
+      Padded<T>* at = beside + *other * layers_;
+      for (int k = 0; k < kPairs; ++k, at += 2) {
+        const Octets level = product(k, 0);
+        at[0] += first_half<T>(level), at[1] += second_half<T>(level);
+      }
+    }
+    return block;
   }
   // Not aligned to two.
   static RINGLET_KERNEL Octets load_two(const Padded<T>* a) { return side_by_side<T>(a[0], a[1]); }

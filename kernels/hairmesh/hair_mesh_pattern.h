@@ -60,7 +60,12 @@ class PatternBuilder {
         first[0]);
     const std::int32_t band = place < sloping ? kSlopes * place + b % layers_ - a % layers_ + 1
                                               : kSlopes * sloping + place - sloping;
-    return (in_columns + first_pair_[static_cast<std::size_t>(c)] + row / 2 * bands + band) * kPairReals +
+    // Bands of four rows lie one after the other, then those of the next four; the last may be of two rows or
+    // one.
+    const std::int32_t four = row / 4, pairs = std::min(2, row_pairs() - 2 * four);
+    return (in_columns + first_pair_[static_cast<std::size_t>(c)] + 2 * four * bands + pairs * band +
+            row % 4 / 2) *
+               kPairReals +
            row % 2 * kSecondBlock;
   }
 

@@ -74,6 +74,21 @@ RINGLET_KERNEL V transpose_times(const V (&block)[3], V a) {
   return __builtin_shufflevector(low, last, 0, 1, 4, 5) + __builtin_shufflevector(low, last, 2, 3, 6, 7) +
          __builtin_shufflevector(high, rest, 0, 1, 4, 5);
 }
+// w less those products, with as few operations in turn as there can be: sweeps wait for them.
+template <class V>
+RINGLET_KERNEL V less_block_times(V w, const V (&block)[3], V a) {
+  return (w - block[0] * spread_component<0>(a)) -
+         (block[1] * spread_component<1>(a) + block[2] * spread_component<2>(a));
+}
+template <class V>
+RINGLET_KERNEL V less_transpose_times(V w, const V (&block)[3], V a) {
+  const V x = block[0] * a, y = block[1] * a, z = block[2] * a, none{};
+  const V low = __builtin_shufflevector(x, y, 0, 4, 1, 5), high = __builtin_shufflevector(x, y, 2, 6, 3, 7),
+          last = __builtin_shufflevector(z, none, 0, 4, 1, 5),
+          rest = __builtin_shufflevector(z, none, 2, 4, 3, 5);
+  return (w - __builtin_shufflevector(low, last, 0, 1, 4, 5)) -
+         (__builtin_shufflevector(low, last, 2, 3, 6, 7) + __builtin_shufflevector(high, rest, 0, 1, 4, 5));
+}
 // The inverse of a symmetric positive definite block.
 template <class V>
 RINGLET_KERNEL void invert(const V (&a)[3], V (&to)[3]) {

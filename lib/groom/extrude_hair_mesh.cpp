@@ -10,6 +10,7 @@
 #include <numeric>
 
 #include "core/error.h"
+#include "core/log.h"
 #include "groom/untangle.h"
 
 namespace ringlet::groom {
@@ -24,8 +25,10 @@ constexpr double kAhead = 20;        // [degrees] of the place that hair is comb
 constexpr double kReach = 1.5;       // radii from that place to where its push is half
 constexpr double kSideways = 0.1;    // share
 constexpr double kLeastShape =
-    0.1;  // of corner tetrahedra, if need be by moving vertices off their streamlines
-constexpr int kSweeps = 200;
+    0.1;                      // of corner tetrahedra, if need be by moving vertices off their streamlines
+constexpr int kRounds = 4;    // of opening prisms
+constexpr int kAttempts = 5;  // each with more lift
+constexpr double kMoreLift = 0.1;   // of the radius
 constexpr double kTurning = 3;      // lengths of the hair that half a turn counts for in where layers lie
 constexpr double kBefore = 1.1;     // radii from the centre to that place
 constexpr double kShortest = 0.15;  // of the length: what a level leaves of hair that is below it
@@ -166,6 +169,33 @@ Vec3 curled(const HairExtrusion& e, const ScalpPatch& patch, const Flow& flow, c
   return point + e.curl_radius * share * (std::cos(angle) * first + std::sin(angle) * second);
 }
 
+// Layers along the streamlines, with prisms opened as far as they can be; not checked.
+HairMesh extrude_once(const HairExtrusion& extrusion, const ScalpPatch& patch, const SignedDistance& head) {
+  const Flow flow(extrusion, patch, head);
+  const std::size_t vertices = patch.points.size();
+  HairMesh mesh;
+  mesh.faces = patch.faces;
+  mesh.layers = extrusion.layers;
+  mesh.positions.resize(vertices * static_cast<std::size_t>(extrusion.layers));
+  std::vector<Streamline> lines(vertices);
+  std::vector<double> lengths(vertices);
+  tbb::parallel_for(std::size_t{0}, vertices, [&](std::size_t v) {
+    lines[v] = follow(flow, patch.points[v], extrusion.length, patch.radius());
+    lengths[v] = cut_length(lines[v], extrusion.length, extrusion.level, patch.axes.col(1));
+  });
+  const std::vector<double> shares = layer_shares(lines, lengths, extrusion.layers);
+  for (std::size_t v = 0; v < vertices; ++v) {
+    mesh.positions[v] = patch.points[v];
+    for (std::size_t k = 1; k < shares.size(); ++k) {
+      Vec3& point = mesh.positions[k * vertices + v];
+      point = curled(extrusion, patch, flow, lines[v].at(lengths[v] * shares[k]), shares[k]);
+      flow.keep_clear(point);
+    }
+  }
+  untangle(mesh, kLeastShape, kRounds, [&](Vec3& x) { flow.keep_clear(x); });
+  return mesh;
+}
+
 }  // namespace
 
 std::optional<Problem> out_of_range(const HairExtrusion& e) {
@@ -196,36 +226,26 @@ std::optional<Problem> out_of_range(const HairExtrusion& e) {
 HairMesh extrude_hair_mesh(const HairExtrusion& extrusion, const ScalpPatch& patch,
                            const SignedDistance& head) {
   if (auto problem = out_of_range(extrusion)) throw Error(ErrorKind::kInput, {std::move(*problem)});
-  const Flow flow(extrusion, patch, head);
-  const std::size_t vertices = patch.points.size();
-  HairMesh mesh;
-  mesh.faces = patch.faces;
-  mesh.layers = extrusion.layers;
-  mesh.positions.resize(vertices * static_cast<std::size_t>(extrusion.layers));
-  std::vector<Streamline> lines(vertices);
-  std::vector<double> lengths(vertices);
-  tbb::parallel_for(std::size_t{0}, vertices, [&](std::size_t v) {
-    lines[v] = follow(flow, patch.points[v], extrusion.length, patch.radius());
-    lengths[v] = cut_length(lines[v], extrusion.length, extrusion.level, patch.axes.col(1));
-  });
-  const std::vector<double> shares = layer_shares(lines, lengths, extrusion.layers);
-  for (std::size_t v = 0; v < vertices; ++v) {
-    mesh.positions[v] = patch.points[v];
-    for (std::size_t k = 1; k < shares.size(); ++k) {
-      Vec3& point = mesh.positions[k * vertices + v];
-      point = curled(extrusion, patch, flow, lines[v].at(lengths[v] * shares[k]), shares[k]);
-      flow.keep_clear(point);
+  HairExtrusion lifted = extrusion;
+  std::string first_problem;
+  for (int attempt = 0; attempt < kAttempts; ++attempt, lifted.lift += kMoreLift * patch.radius()) {
+    HairMesh mesh = extrude_once(lifted, patch, head);
+    try {
+      check(mesh, "hair mesh");
+    } catch (const Error& error) {
+      if (first_problem.empty()) first_problem = error.problems().front().what;
+      continue;
     }
+    if (attempt > 0)
+      log_info(fmt::format(
+          "hair mesh: stands off by a lift of {:.3g} m instead of {:.3g}, so that no prism is inverted",
+          lifted.lift, extrusion.lift));
+    return mesh;
   }
-  untangle(mesh, kLeastShape, kSweeps, [&](Vec3& x) { flow.keep_clear(x); });
-  try {
-    check(mesh, "hair mesh");
-  } catch (const Error& error) {
-    throw Error(ErrorKind::kInput, "hair mesh",
-                fmt::format("cannot be extruded so: {}", error.problems().front().what),
-                "give more lift, more layers or less gravity, length or curl, or more vertices");
-  }
-  return mesh;
+  throw Error(ErrorKind::kInput, "hair mesh",
+              fmt::format("cannot be extruded so, nor with {} more lifts up to {:.3g} m: {}", kAttempts - 1,
+                          extrusion.lift + (kAttempts - 1) * kMoreLift * patch.radius(), first_problem),
+              "choose a smoother part of the head, more layers or comb, or less gravity, length or curl");
 }
 
 // ---- Styles ---------------------------------------------------------------------------------------------

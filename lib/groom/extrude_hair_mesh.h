@@ -35,9 +35,10 @@ struct HairExtrusion {
 // What is out of its range, `where` being the name of the number; empty: nothing.
 std::optional<Problem> out_of_range(const HairExtrusion& extrusion);
 
-// `head`: how far outside the head a point is [m]; safe from several threads. The result passed check().
-// Throws Error{kInput} where a number is out of its range or where prisms would be inverted or vertices in
-// the head.
+// `head`: how far outside the head a point is [m]; safe from several threads. Vertices whose prisms would be
+// inverted are moved off their streamlines as little as opens them; where that does not suffice the lift
+// grows in steps and the log says so. The result passed check(). Throws Error{kInput} where a number is out
+// of its range or all lifts fail.
 HairMesh extrude_hair_mesh(const HairExtrusion& extrusion, const ScalpPatch& patch,
                            const SignedDistance& head);
 

@@ -67,31 +67,6 @@ class Region {
     return farthest;
   }
 
-  // The radii along three axes of the ellipsoid about the centre that is nearest to the vertices in the
-  // algebraic sense; the mean distance along an axis that they say nothing of.
-  Vec3 fit_radii(const Mat3& axes) const {
-    Mat3 normal = Mat3::Zero();
-    Vec3 right = Vec3::Zero();
-    double mean = 0, count = 0;
-    for (const std::int32_t t : triangles_) {
-      for (int c = 0; c < 3; ++c) {
-        const Vec3 local = axes.transpose() * (corner(t, c) - centre), squares = local.cwiseAbs2();
-        normal += squares * squares.transpose();
-        right += squares;
-        mean += local.norm();
-        count += 1;
-      }
-    }
-    mean /= count;
-    const Vec3 inverse_squares = normal.ldlt().solve(right);
-    Vec3 radii;
-    for (int k = 0; k < 3; ++k) {
-      const double radius = inverse_squares[k] > 0 ? 1 / std::sqrt(inverse_squares[k]) : mean;
-      radii[k] = std::clamp(radius, 0.6 * mean, 1.6 * mean);
-    }
-    return radii;
-  }
-
   Vec3 centre;
 
  private:
@@ -248,6 +223,26 @@ Mat3 head_axes(const ScalpRegion& region, scene::Axis up) {
   return axes;
 }
 
+// The radii along three axes of the ellipsoid about the centre that is nearest to the points in the algebraic
+// sense; not far from the mean distance along an axis that they say little of.
+Vec3 fit_radii(const std::vector<Vec3>& points, const Vec3& centre, const Mat3& axes) {
+  Mat3 normal = Mat3::Zero();
+  Vec3 right = Vec3::Zero();
+  double mean = 0;
+  for (const Vec3& point : points) {
+    const Vec3 local = axes.transpose() * (point - centre), squares = local.cwiseAbs2();
+    normal += squares * squares.transpose();
+    right += squares;
+    mean += local.norm() / static_cast<double>(points.size());
+  }
+  const Vec3 inverse_squares = normal.ldlt().solve(right);
+  Vec3 radii;
+  for (int k = 0; k < 3; ++k)
+    radii[k] =
+        std::clamp(inverse_squares[k] > 0 ? 1 / std::sqrt(inverse_squares[k]) : mean, 0.7 * mean, 1.4 * mean);
+  return radii;
+}
+
 }  // namespace
 
 ScalpPatch lay_scalp_patch(const ScalpRegion& region, int vertices, const Scalp& scalp, scene::Axis up) {
@@ -257,7 +252,6 @@ ScalpPatch lay_scalp_patch(const ScalpRegion& region, int vertices, const Scalp&
   ScalpPatch patch;
   patch.centre = triangles.centre;
   patch.axes = head_axes(region, up);
-  patch.radii = triangles.fit_radii(patch.axes);
   const Vec3 pole = region.pole ? region.pole->normalized() : triangles.middle();
   const Polar polar(pole, patch.axes.col(2));
   const std::vector<double> rim = find_rim(triangles, polar, region.angle);
@@ -284,6 +278,7 @@ ScalpPatch lay_scalp_patch(const ScalpRegion& region, int vertices, const Scalp&
     if (ring > 0) join_rings(inner, sizes[ring - 1], outer, size, patch.faces);
     inner = outer;
   }
+  patch.radii = fit_radii(patch.points, patch.centre, patch.axes);
   return patch;
 }
 

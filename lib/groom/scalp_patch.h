@@ -23,8 +23,7 @@ struct ScalpPatch {
   std::vector<Vec3> points;           // [m] on the head
   Vec3 centre = Vec3::Zero();         // [m]
   Mat3 axes = Mat3::Identity();       // columns: to the left of one who looks forward, up, forward
-  Vec3 radii =
-      Vec3::Ones();  // [m] along the axes: of the ellipsoid about the centre nearest to the triangles
+  Vec3 radii = Vec3::Ones();   // [m] along the axes: of the ellipsoid about the centre nearest to the points
   Vec3 front = Vec3::UnitZ();  // unit; from the centre towards the middle of the patch's front rim
   double radius() const { return radii.mean(); }
 };

@@ -7,8 +7,9 @@ namespace ringlet::groom {
 
 namespace {
 
-constexpr double kSmoothing = 0.3;  // of displacements, from sweep to sweep
-constexpr double kDamping = 0.02;   // of a vertex's step, relative to the trace of its system
+constexpr double kSmoothing = 0.3;                // of displacements, from sweep to sweep
+constexpr int kSweeps = 100, kSmoothSweeps = 60;  // of a round, and with smoothing
+constexpr double kDamping = 0.02;                 // of a vertex's step, relative to the trace of its system
 
 // A corner tetrahedron: det(a - o, b - o, top - bottom), where o is one of bottom and top.
 struct Corner {
@@ -162,10 +163,10 @@ class Untangler {
 
 }  // namespace
 
-void untangle(HairMesh& mesh, double least, int sweeps, const std::function<void(Vec3&)>& keep_clear) {
+void untangle(HairMesh& mesh, double least, int rounds, const std::function<void(Vec3&)>& keep_clear) {
   Untangler untangler(mesh, least, keep_clear);
-  for (int sweep = 0; sweep < sweeps && !untangler.is_done(); ++sweep) {
-    if (sweep > 0 && sweep < sweeps / 2) untangler.smooth();
+  for (int sweep = 0; sweep < rounds * kSweeps && !untangler.is_done(); ++sweep) {
+    if (sweep > 0 && sweep % kSweeps < kSmoothSweeps) untangler.smooth();
     untangler.sweep();
   }
 }

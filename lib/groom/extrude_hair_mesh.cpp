@@ -20,18 +20,18 @@ namespace {
 constexpr double kSteps = 40;        // of the integration to a head's radius of way
 constexpr double kClear = 0.08;      // of the radius: nearer to the head, hair goes away from it
 constexpr double kLeast = 0.01;      // of the radius: no layer but the scalp's is nearer to the head
-constexpr double kLeastRise = 0.35;  // cosine: how steeply hair leaves the scalp at least
-constexpr double kAhead = 20;        // [degrees] of the place that hair is combed back from, before the patch
-constexpr double kReach = 1.5;       // radii from that place to where its push is half
-constexpr double kSideways = 0.1;    // share
-constexpr double kLeastShape =
-    0.1;                      // of corner tetrahedra, if need be by moving vertices off their streamlines
-constexpr int kRounds = 4;    // of opening prisms
-constexpr int kAttempts = 5;  // each with more lift
-constexpr double kMoreLift = 0.1;   // of the radius
-constexpr double kTurning = 3;      // lengths of the hair that half a turn counts for in where layers lie
-constexpr double kBefore = 1.1;     // radii from the centre to that place
-constexpr double kShortest = 0.15;  // of the length: what a level leaves of hair that is below it
+constexpr double kLeastRise = 0.35;  // sine: how steeply hair leaves the scalp at least
+constexpr double kShortest = 0.15;   // of the length: what a level leaves of hair that is below it
+constexpr double kTurning = 3;       // lengths of the hair that half a turn counts for in where layers lie
+
+// The place that hair is combed back from: so many degrees past the patch's front rim, so many radii from the
+// centre; in how many radii from it the push is half, and the share of it that goes sideways.
+constexpr double kAhead = 20, kBefore = 1.1, kReach = 1.5, kSideways = 0.1;
+
+constexpr double kLeastShape = 0.1;  // of corner tetrahedra (untangle.h)
+constexpr int kRounds = 4;           // of opening prisms
+constexpr int kAttempts = 5;         // each with more lift
+constexpr double kMoreLift = 0.1;    // of the radius
 
 // The flow about one head (extrude_hair_mesh.h).
 class Flow {
@@ -42,9 +42,8 @@ class Flow {
     source_ = std::max(top * top - 1 / top, 1e-3);  // some, so that hair has a way where nothing bends it
     // The front of the rim in the coordinates of the sphere, and on past it: down the forehead.
     const Vec3 front = (patch.axes.transpose() * patch.front).normalized();
-    const Vec3 axis = Vec3::UnitX();
     const double turn = kAhead * std::numbers::pi / 180;
-    comb_from_ = kBefore * (Eigen::AngleAxisd(turn, axis) * front);
+    comb_from_ = kBefore * (Eigen::AngleAxisd(turn, Vec3::UnitX()) * front);
   }
 
   // Unit direction at a place.

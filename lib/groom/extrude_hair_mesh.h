@@ -1,17 +1,19 @@
 // Extrudes a hair mesh from a patch on the scalp.
 //
 // Layers are carried outward by the streamlines of a steady flow about the head. Streamlines of one flow
-// never cross, and a patch that they leave on one side keeps its sides: layers pass neither through each
-// other nor through the head, however hair falls. In coordinates where the head is the unit sphere, y, with n
-// = y / |y| and r = |y|, the flow is
+// never cross, and a patch that they leave on one side keeps its sides: the finer the patch, the less layers
+// can pass through each other, however hair falls. What its finite faces still turn inside out is opened by
+// moving vertices a little. In coordinates where the head is the unit sphere, y, with r = |y| and n = y / r,
+// the flow is
 //
-//   F = gravity (T + (k/2) (T - (T.n) n) - k (T.n) n) + q n / r^2,   k = 1 / r^3,   T = g + c (y - a) / |y -
-//   a|^2
+//   F = gravity (T + (k/2) (T - (T.n) n) - k (T.n) n) + q n / r^2,   k = 1 / r^3,
+//   T = g + c / (1 + (|S (y - a)| / 1.5)^4) S (y - a) / |S (y - a)|
 //
-// T pulls down along the unit vector g and away from a place a in front of the patch, which combs hair back;
-// the terms with k bend it round the sphere, as a dipole bends potential flow; q = (1 + l)^2 - 1 / (1 + l)
-// makes hair on top of the head come to rest at the height l = lift / radius where the two balance. Near the
-// head itself, which is no sphere, what F has of a way into it is taken off.
+// T pulls down along the unit vector g and away from a place a before the front of the patch, which combs
+// hair back; S = diag(0.1, 1, 1) takes most of the way to the sides off it, so that hair on top stays
+// together. The terms with k bend T round the sphere, as a dipole bends potential flow; q = (1 + l)^2 - 1 /
+// (1 + l) lets hair on top of the head lie at the height l = lift / radius, where it and the pull down
+// balance. Near the head itself, which is no sphere, directions are turned until they rise from it.
 #pragma once
 #include <optional>
 

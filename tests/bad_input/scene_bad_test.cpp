@@ -47,7 +47,8 @@ constexpr Case kSchemaCases[] = {
     {R"({"effects": {"solids": {}}})", "scene#/effects/solids: found {}, expected a list, each an object"},
     // enum
     {R"({"units": {"up": "w"}})", R"(scene#/units/up: found "w", expected "x", "y" or "z")"},
-    {R"({"model": {"type": "rods"}})", R"(scene#/model/type: found "rods", expected "ams" or "mass_spring")"},
+    {R"({"model": {"type": "rods"}})",
+     R"(scene#/model/type: found "rods", expected "ams", "mass_spring" or "hair_mesh")"},
     // minimum, maximum, exclusiveMinimum
     {R"({"model": {"substeps": 0}})", "scene#/model/substeps: found 0, expected an integer from 1 to 1000"},
     {R"({"model": {"substeps": 1001}})",
@@ -131,9 +132,10 @@ constexpr Case kMeaningCases[] = {
      "scene#/motion/keys/1/frame: found 2.0, expected a frame after the previous key's 3.0\n"
      "scene#/motion/keys/1/rotate: found [0.0,0.0,0.0,0.0], expected a quaternion that is not zero"},
     // grooms
-    {R"({"groom": {"file": null}})", "scene#/groom: found neither file nor grow, expected one of them"},
+    {R"({"groom": {"file": null}})",
+     "scene#/groom: found none of file, grow, hair_mesh, expected one of file, grow, hair_mesh"},
     {R"({"head": {"mesh": "head.obj"}, "groom": {"grow": {"strands": 9}}})",
-     "scene#/groom: found both file and grow, expected one of them"},
+     "scene#/groom: found file and grow, expected one of file, grow, hair_mesh"},
     {R"({"groom": {"root_offset": "snap"}})",
      R"(scene#/groom/root_offset: found "snap" of a fixed groom, expected "keep", or roots held by the head)"},
     {R"({"groom": {"attach": "nearest"}})",
@@ -321,94 +323,98 @@ class EveryRule : public SceneTest {
                                                 testing::Not(testing::HasSubstr("\n"))));
   }
 
+  // Between them these have every key.
+  static std::vector<Json> wholes() { return {full(), full_hair_mesh()}; }
+
   Schema schema_;
 };
 
 TEST_F(EveryRule, IsKeptByTheFullScene) {
-  load_json(full());
   std::map<std::string, std::set<std::string>>
       unused;  // keys of an object of the schema, joined -> those not seen
-  Json scene = full();
-  schema_.walk(scene, [&](const Json& node, Json& value, const std::string&) {
-    if (!value.is_object()) return;
-    std::string all;
-    for (const auto& [key, ignored] : node["properties"].items()) all += key + " ";
-    if (!unused.contains(all))
-      for (const auto& [key, ignored] : node["properties"].items()) unused[all].insert(key);
-    for (const auto& [key, ignored] : value.items()) unused[all].erase(key);
-  });
+  for (Json scene : wholes()) {
+    load_json(scene);
+    schema_.walk(scene, [&](const Json& node, Json& value, const std::string&) {
+      if (!value.is_object()) return;
+      std::string all;
+      for (const auto& [key, ignored] : node["properties"].items()) all += key + " ";
+      if (!unused.contains(all))
+        for (const auto& [key, ignored] : node["properties"].items()) unused[all].insert(key);
+      for (const auto& [key, ignored] : value.items()) unused[all].erase(key);
+    });
+  }
   for (const auto& [all, keys] : unused) EXPECT_THAT(keys, testing::IsEmpty()) << all;
 }
 
 TEST_F(EveryRule, OnTypesIsReportedWhereItIsBroken) {
-  Json scene = full();
-  schema_.walk(scene, [&](const Json&, Json& value, const std::string& pointer) {
-    const Json right = value;
-    value = of_wrong_type(right);
-    expect_one_problem(scene, pointer);
-    value = right;
-  });
+  for (Json scene : wholes())
+    schema_.walk(scene, [&](const Json&, Json& value, const std::string& pointer) {
+      const Json right = value;
+      value = of_wrong_type(right);
+      expect_one_problem(scene, pointer);
+      value = right;
+    });
 }
 
 TEST_F(EveryRule, OnRangesIsReportedWhereItIsBroken) {
-  Json scene = full();
-  schema_.walk(scene, [&](const Json& node, Json& value, const std::string& pointer) {
-    const Json right = value;
-    const auto break_with = [&](const Json& wrong) {
-      value = wrong;
-      expect_one_problem(scene, pointer);
-      value = right;
-    };
-    const bool integer = node.value("type", "") == "integer";
-    const auto beyond = [&](const Json& limit, double sign) -> Json {
-      if (integer) return limit.get<std::int64_t>() + static_cast<std::int64_t>(sign);
-      const double x = limit;
-      return x + sign * std::max(1e-9, 1e-9 * std::abs(x));
-    };
-    if (node.contains("minimum")) break_with(beyond(node["minimum"], -1));
-    if (node.contains("maximum")) break_with(beyond(node["maximum"], 1));
-    if (node.contains("exclusiveMinimum")) break_with(node["exclusiveMinimum"]);
-    if (node.contains("enum")) break_with("no such word");
-    if (node.contains("maxLength")) break_with(std::string(node["maxLength"].get<std::size_t>() + 1, 'x'));
-    if (node.contains("minLength")) break_with("");
-    if (value.is_array() && node.contains("minItems")) break_with(Json::array());
-  });
+  for (Json scene : wholes())
+    schema_.walk(scene, [&](const Json& node, Json& value, const std::string& pointer) {
+      const Json right = value;
+      const auto break_with = [&](const Json& wrong) {
+        value = wrong;
+        expect_one_problem(scene, pointer);
+        value = right;
+      };
+      const bool integer = node.value("type", "") == "integer";
+      const auto beyond = [&](const Json& limit, double sign) -> Json {
+        if (integer) return limit.get<std::int64_t>() + static_cast<std::int64_t>(sign);
+        const double x = limit;
+        return x + sign * std::max(1e-9, 1e-9 * std::abs(x));
+      };
+      if (node.contains("minimum")) break_with(beyond(node["minimum"], -1));
+      if (node.contains("maximum")) break_with(beyond(node["maximum"], 1));
+      if (node.contains("exclusiveMinimum")) break_with(node["exclusiveMinimum"]);
+      if (node.contains("enum")) break_with("no such word");
+      if (node.contains("maxLength")) break_with(std::string(node["maxLength"].get<std::size_t>() + 1, 'x'));
+      if (node.contains("minLength")) break_with("");
+      if (value.is_array() && node.contains("minItems")) break_with(Json::array());
+    });
 }
 
 TEST_F(EveryRule, OnKeysIsReportedWhereItIsBroken) {
-  Json scene = full();
-  schema_.walk(scene, [&](const Json& node, Json& value, const std::string& pointer) {
-    if (!value.is_object()) return;
-    value["no_such_key"] = 1;
-    expect_one_problem(scene, pointer + "/no_such_key");
-    value.erase("no_such_key");
-    for (const std::string key : node.value("required", Json::array())) {
-      const Json right = value[key];
-      value.erase(key);
-      expect_one_problem(scene, pointer + "/" + key);
-      value[key] = right;
-    }
-  });
+  for (Json scene : wholes())
+    schema_.walk(scene, [&](const Json& node, Json& value, const std::string& pointer) {
+      if (!value.is_object()) return;
+      value["no_such_key"] = 1;
+      expect_one_problem(scene, pointer + "/no_such_key");
+      value.erase("no_such_key");
+      for (const std::string key : node.value("required", Json::array())) {
+        const Json right = value[key];
+        value.erase(key);
+        expect_one_problem(scene, pointer + "/" + key);
+        value[key] = right;
+      }
+    });
 }
 
 // Whatever part of a scene is missing, it loads or says what is wrong with it.
 TEST_F(EveryRule, HoldsWithAnyPartLeftOut) {
-  Json scene = full();
-  schema_.walk(scene, [&](const Json&, Json& value, const std::string&) {
-    if (value.is_array()) {
+  for (Json scene : wholes())
+    schema_.walk(scene, [&](const Json&, Json& value, const std::string&) {
+      if (value.is_array()) {
+        const Json right = value;
+        value = Json::array();
+        error_of(scene);
+        value = right;
+      }
+      if (!value.is_object()) return;
       const Json right = value;
-      value = Json::array();
-      error_of(scene);
-      value = right;
-    }
-    if (!value.is_object()) return;
-    const Json right = value;
-    for (const auto& [key, ignored] : right.items()) {
-      value.erase(key);
-      EXPECT_NO_THROW(error_of(scene)) << key;
-      value = right;
-    }
-  });
+      for (const auto& [key, ignored] : right.items()) {
+        value.erase(key);
+        EXPECT_NO_THROW(error_of(scene)) << key;
+        value = right;
+      }
+    });
 }
 
 }  // namespace

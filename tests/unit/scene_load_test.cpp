@@ -43,6 +43,39 @@ TEST_F(SceneLoad, TakesEveryValueOver) {
   EXPECT_EQ(s.cache.compression, Compression::kQuantised);
 }
 
+TEST_F(SceneLoad, ReadsHairMeshes) {
+  const Scene s = load_json(full_hair_mesh());  // in centimetres
+  ASSERT_TRUE(s.grooms[0].hair_mesh && s.model.hair_mesh);
+  const HairMeshStrands& strands = *s.grooms[0].hair_mesh;
+  EXPECT_EQ(strands.density, 5e4);
+  EXPECT_EQ(strands.particles, 9);
+  EXPECT_DOUBLE_EQ(strands.curl_radius, 0.005);
+  EXPECT_EQ(strands.curl_turns, 3);
+  EXPECT_DOUBLE_EQ(strands.noise, 0.0025);
+  EXPECT_DOUBLE_EQ(s.grooms[0].width, 1e-4);
+  const HairMeshModel& model = *s.model.hair_mesh;
+  EXPECT_EQ(s.model.substeps, 2);
+  EXPECT_EQ(model.density, 90);
+  EXPECT_EQ(model.stretch, 1e4);
+  EXPECT_EQ(model.stretch_across, 200);
+  EXPECT_EQ(model.shear, 300);
+  EXPECT_EQ(model.horizontal, 400);
+  EXPECT_EQ(model.bend, 0.1);
+  EXPECT_EQ(model.bend_across, 0.2);
+  EXPECT_EQ(model.volume, 500);
+  EXPECT_EQ(model.damping, 0.01);
+  EXPECT_EQ(model.drag, 0.75);
+  EXPECT_EQ(model.residual, 1e-5);
+  EXPECT_EQ(model.max_iterations, 50);
+  EXPECT_FALSE(model.deformation_minimisation);
+  EXPECT_EQ(model.start, HairMeshStart::kCollapsed);
+  ASSERT_EQ(model.ellipsoids.size(), 1u);
+  EXPECT_TRUE(model.ellipsoids[0].centre.isApprox(Vec3(0.01, 0.02, 0.03), 1e-15));
+  EXPECT_TRUE(model.ellipsoids[0].radii.isApprox(Vec3(0.04, 0.05, 0.06), 1e-15));
+  EXPECT_FALSE(model.ellipsoids[0].follows_head);
+  EXPECT_EQ(load_json(minimal()).model.hair_mesh.has_value(), false);
+}
+
 TEST_F(SceneLoad, MakesMetresOfLengthsAndNothingElse) {
   const Scene s = load_json(full());  // in centimetres
   EXPECT_EQ(s.units.metres_per_unit, 0.01);

@@ -37,6 +37,60 @@ struct DefaultCase {
   Json in_struct;
 };
 
+Json minimal_hair_mesh() {
+  return Json::parse(R"({
+    "name": "mesh", "frames": {"last": 2}, "groom": [{"hair_mesh": {"file": "a.hair", "density": 9}, "attach": "fixed"},
+              {"hair_mesh": {"file": "b.hair", "strands": 9}, "attach": "fixed"}],
+    "model": {"type": "hair_mesh", "hair_mesh": {"ellipsoids": [{"centre": [0, 0, 0], "radii": [1, 1, 1]}]}}})");
+}
+
+// Of that scene.
+std::vector<DefaultCase> hair_mesh_defaults(const Scene& s) {
+  const HairMeshStrands& strands = *s.grooms[0].hair_mesh;
+  const HairMeshModel& model = *s.model.hair_mesh;
+  const Ellipsoid& ellipsoid = model.ellipsoids[0];
+  const std::string in_strands = "/definitions/hair_mesh_strands/properties/",
+                    in_model = "/definitions/hair_mesh_model/properties/",
+                    in_ellipsoid = "/definitions/ellipsoid/properties/",
+                    of_type = "/definitions/model/then/properties/";
+  std::vector<DefaultCase> cases = {
+      {of_type + "substeps", "/model/substeps", s.model.substeps},
+      {of_type + "geometric_stiffness", "/model/geometric_stiffness", s.model.geometric_stiffness},
+      {of_type + "material_damping", "/model/material_damping", s.model.material_damping},
+      {of_type + "angular_tangent", "/model/angular_tangent",
+       s.model.angular_tangent == AngularTangent::kConsistent ? "consistent" : "another"},
+      {of_type + "integrity_tangent", "/model/integrity_tangent",
+       s.model.integrity_tangent == IntegrityTangent::kExact ? "exact" : "another"},
+      {in_model + "start", "/model/hair_mesh/start",
+       model.start == HairMeshStart::kRest ? "rest" : "another"},
+      {in_ellipsoid + "rotate", "/model/hair_mesh/ellipsoids/0/rotate",
+       Json::array(
+           {ellipsoid.rotation.x(), ellipsoid.rotation.y(), ellipsoid.rotation.z(), ellipsoid.rotation.w()})},
+      {in_ellipsoid + "follow", "/model/hair_mesh/ellipsoids/0/follow",
+       ellipsoid.follows_head ? "head" : "another"},
+      {in_ellipsoid + "friction", "/model/hair_mesh/ellipsoids/0/friction", ellipsoid.friction}};
+  const auto add = [&](const std::string& in_schema, const std::string& block, const char* key,
+                       const Json& value) {
+    cases.push_back({in_schema + key, block + key, value});
+  };
+  const std::string groom = "/groom/0/hair_mesh/", of_model = "/model/hair_mesh/";
+  add(in_strands, "/groom/1/hair_mesh/", "density", s.grooms[1].hair_mesh->density);
+  add(in_strands, groom, "strands", strands.strands), add(in_strands, groom, "particles", strands.particles);
+  add(in_strands, groom, "seed", strands.seed), add(in_strands, groom, "curl_radius", strands.curl_radius);
+  add(in_strands, groom, "curl_turns", strands.curl_turns), add(in_strands, groom, "noise", strands.noise);
+  add(in_strands, groom, "noise_waves", strands.noise_waves);
+  add(in_model, of_model, "density", model.density), add(in_model, of_model, "stretch", model.stretch);
+  add(in_model, of_model, "stretch_across", model.stretch_across),
+      add(in_model, of_model, "shear", model.shear);
+  add(in_model, of_model, "horizontal", model.horizontal), add(in_model, of_model, "bend", model.bend);
+  add(in_model, of_model, "bend_across", model.bend_across), add(in_model, of_model, "volume", model.volume);
+  add(in_model, of_model, "damping", model.damping), add(in_model, of_model, "drag", model.drag);
+  add(in_model, of_model, "residual", model.residual),
+      add(in_model, of_model, "max_iterations", model.max_iterations);
+  add(in_model, of_model, "deformation_minimisation", model.deformation_minimisation);
+  return cases;
+}
+
 TEST_F(SceneSchema, FillsInExactlyTheSchemasDefaults) {
   const Scene s = load_json(Json::parse(R"({
     "name": "defaults", "frames": {"last": 2}, "motion": {"keys": [{"frame": 1}]},
@@ -166,16 +220,17 @@ TEST_F(SceneSchema, FillsInExactlyTheSchemasDefaults) {
       {defs + "model/properties/stiffness/properties/angular", "/model/stiffness/angular",
        s.model.stiffness.angular},
       {defs + "model/properties/particle_mass", "/model/particle_mass", s.model.particle_mass},
-      {defs + "model/properties/substeps", "/model/substeps", s.model.substeps},
+      {defs + "model/else/properties/substeps", "/model/substeps", s.model.substeps},
       {defs + "model/properties/drag", "/model/drag", s.model.drag},
       {defs + "model/properties/clamped_particles", "/model/clamped_particles", s.model.clamped_particles},
       {defs + "model/properties/preload", "/model/preload", s.model.preload},
-      {defs + "model/else/properties/geometric_stiffness", "/model/geometric_stiffness",
+      {defs + "model/else/else/properties/geometric_stiffness", "/model/geometric_stiffness",
        s.model.geometric_stiffness},
-      {defs + "model/else/properties/material_damping", "/model/material_damping", s.model.material_damping},
-      {defs + "model/else/properties/angular_tangent", "/model/angular_tangent",
+      {defs + "model/else/else/properties/material_damping", "/model/material_damping",
+       s.model.material_damping},
+      {defs + "model/else/else/properties/angular_tangent", "/model/angular_tangent",
        word(is(s.model.angular_tangent, AngularTangent::kConsistent), "consistent")},
-      {defs + "model/else/properties/integrity_tangent", "/model/integrity_tangent",
+      {defs + "model/else/else/properties/integrity_tangent", "/model/integrity_tangent",
        word(is(s.model.integrity_tangent, IntegrityTangent::kExact), "exact")},
       {defs + "inextensible/properties/tolerance", "/effects/inextensible/tolerance",
        s.effects.inextensible->tolerance},
@@ -206,14 +261,19 @@ TEST_F(SceneSchema, FillsInExactlyTheSchemasDefaults) {
   const Json resolved = Json::parse(s.resolved);
   std::set<std::string> in_schema, tested;
   collect_defaults(schema, "", in_schema);
-  for (const DefaultCase& c : cases) {
-    const Json& value = schema[Json::json_pointer(c.in_schema + "/default")];
-    EXPECT_EQ(resolved.at(Json::json_pointer(c.in_resolved)), value) << c.in_schema;
-    EXPECT_EQ(c.in_struct, value) << c.in_schema;
-    tested.insert(c.in_schema + "/default");
-  }
+  const auto test = [&](const Json& as_resolved, const std::vector<DefaultCase>& list) {
+    for (const DefaultCase& c : list) {
+      const Json& value = schema.at(Json::json_pointer(c.in_schema + "/default"));
+      EXPECT_EQ(as_resolved.at(Json::json_pointer(c.in_resolved)), value) << c.in_schema;
+      EXPECT_EQ(c.in_struct, value) << c.in_schema;
+      tested.insert(c.in_schema + "/default");
+    }
+  };
+  test(resolved, {std::begin(cases), std::end(cases)});
+  const Scene mesh = load_json(minimal_hair_mesh());
+  test(Json::parse(mesh.resolved), hair_mesh_defaults(mesh));
   for (const char* name : {"geometric_stiffness", "material_damping", "angular_tangent", "integrity_tangent"})
-    tested.insert(defs + "model/then/properties/" + name + "/default");  // below
+    tested.insert(defs + "model/else/then/properties/" + name + "/default");  // below
   EXPECT_EQ(tested, in_schema) << "a default without a test, or a test without a default";
 }
 
@@ -254,7 +314,7 @@ TEST_F(SceneSchema, DefaultDragIsThatOfAHairInAir) {
 }
 
 TEST_F(SceneSchema, TakesThePapersVariantsFromItsScheme) {
-  const Json variants = Json::parse(schema_text())["definitions"]["model"]["then"]["properties"];
+  const Json variants = Json::parse(schema_text())["definitions"]["model"]["else"]["then"]["properties"];
   const Scene paper = load_json(minimal(), {"/model/scheme=\"paper\""});
   const Json resolved = Json::parse(paper.resolved)["model"];
   EXPECT_EQ(resolved["geometric_stiffness"], variants["geometric_stiffness"]["default"]);
@@ -345,13 +405,22 @@ TEST_F(SceneSchema, KnowsEveryWordOfTheSchema) {
   for (const auto& [in_schema, in_scene] : words)
     for (const Json& word : schema.at(Json::json_pointer(in_schema)))
       EXPECT_NO_THROW(load_json(full(), {std::string(in_scene) + "=" + word.dump()})) << in_scene << word;
+  const std::tuple<const char*, const char*> mesh_words[] = {
+      {"/definitions/hair_mesh_model/properties/start/enum", "/model/hair_mesh/start"},
+      {"/definitions/ellipsoid/properties/follow/enum", "/model/hair_mesh/ellipsoids/0/follow"},
+  };
+  for (const auto& [in_schema, in_scene] : mesh_words)
+    for (const Json& word : schema.at(Json::json_pointer(in_schema)))
+      EXPECT_NO_THROW(load_json(full_hair_mesh(), {std::string(in_scene) + "=" + word.dump()}))
+          << in_scene << word;
+  // full() softens, which ams alone does; only a hair mesh goes with every model.
   for (const Json& word : schema.at("/definitions/model/properties/type/enum"_json_pointer))
-    EXPECT_NO_THROW(load_json(minimal(), {"/model/type=" + word.dump()}))
-        << "full() softens, which ams alone does";
+    EXPECT_NO_THROW(load_json(full_hair_mesh(), {"/model={}", "/model/type=" + word.dump()})) << word;
   std::size_t enums = 0;
   each_value_schema(schema, "",
                     [&](const Json& node, const std::string&) { enums += node.contains("enum"); });
-  EXPECT_EQ(enums, std::size(words) + 2) << "all but cache.fields, which stay words, and model.type";
+  EXPECT_EQ(enums, std::size(words) + std::size(mesh_words) + 2)
+      << "all but cache.fields, which stay words, and model.type";
 }
 
 }  // namespace

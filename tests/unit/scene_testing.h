@@ -60,6 +60,25 @@ class SceneTest : public testing::Test {
         R"({"name": "tiny", "frames": {"last": 2}, "groom": {"file": "a.hair", "attach": "fixed"}})");
   }
 
+  // Every key that only the model hair_mesh has.
+  static Json full_hair_mesh() {
+    return Json::parse(R"({
+      "name": "full_hair_mesh",
+      "frames": {"last": 9},
+      "units": {"length": "cm"},
+      "head": {"mesh": "head.obj"},
+      "groom": {"name": "long", "hair_mesh": {"file": "a.hair", "strands": 0, "density": 5e4, "particles": 9, "seed": 3,
+                "curl_radius": 0.5, "curl_turns": 3, "noise": 0.25, "noise_waves": 2}, "width": 0.01},
+      "model": {
+        "type": "hair_mesh", "substeps": 2,
+        "hair_mesh": {"density": 90, "stretch": 1e4, "stretch_across": 200, "shear": 300, "horizontal": 400, "bend": 0.1,
+          "bend_across": 0.2, "volume": 500, "damping": 0.01, "drag": 0.75, "residual": 1e-5, "max_iterations": 50,
+          "deformation_minimisation": false, "start": "collapsed",
+          "ellipsoids": [{"centre": [1, 2, 3], "radii": [4, 5, 6], "rotate": [0, 0, 0, 2], "follow": "motion", "friction": 0.5}]}
+      }
+    })");
+  }
+
   // A valid scene that uses every key of the schema.
   static Json full() {
     return Json::parse(R"({

@@ -70,6 +70,17 @@ std::array<double, 2> uniform_in(const HairMesh& rest, const HairMesh::Face& fac
   }
 }
 
+// Share of the offsets that a place of the mesh has room for, by the volume that the directions of the
+// gradient's columns span. Where that is small a small deformation would throw offsets far; where curves
+// fold, which check() does not exclude between layers, points stay on their curves.
+double room_for_offsets(const Mat3& gradient) {
+  constexpr double kNone = 0.1, kAll = 0.4;
+  const double spanned =
+      gradient.determinant() / (gradient.col(0).norm() * gradient.col(1).norm() * gradient.col(2).norm());
+  const double x = std::clamp((spanned - kNone) / (kAll - kNone), 0.0, 1.0);
+  return x > 0 ? x * x * (3 - 2 * x) : 0;  // 0 also for what is not a number
+}
+
 // The slopes of the spline at its knots as weights of all layers: that of the parabola through a layer and
 // its neighbours, at the ends of the one next to it.
 std::vector<std::vector<double>> slopes(std::span<const double> knots) {
@@ -252,12 +263,9 @@ void HairMeshStrands::add_offsets(const HairMeshStrandsDesc& desc) {
         const auto [first, second] = frame_along(gradient.col(2).normalized(), across);
         across = first;
         const Eigen::Vector2d at = offset.at(static_cast<double>(j) / (points_ - 1));
-        const double room = gradient.col(0).norm() * gradient.col(1).norm() * gradient.col(2).norm();
-        // Where the curves fold, which check() does not exclude between layers, a point stays on its curve.
-        const bool folds = !(gradient.determinant() > 1e-6 * room);
         const Vec3 coefficients =
-            folds ? Vec3(Vec3::Zero()) : Vec3(gradient.inverse() * (at[0] * first + at[1] * second));
-        offsets[s * knots_.size() + j] = coefficients.cast<float>();
+            room_for_offsets(gradient) * (gradient.inverse() * (at[0] * first + at[1] * second));
+        if (coefficients.allFinite()) offsets[s * knots_.size() + j] = coefficients.cast<float>();
       }
     }
   });

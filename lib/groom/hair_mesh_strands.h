@@ -12,7 +12,8 @@
 //
 // Curl and noise are offsets o of the rest shape. Each is stored as xi = F0^-1 o, with F = [C_u, C_v, C_t]
 // the gradient of the curves at its point, and given back as F xi: offsets go with the mesh's deformation, do
-// not swim along it, need no frame that could flip, and stay finite where the mesh is collapsed. A strand is
+// not swim along it, need no frame that could flip, and stay finite where the mesh is collapsed. They fade
+// where the columns of F0 are nearly in a plane, which small deformations would magnify. A strand is
 // therefore a linear function of the vertices: place() of velocities gives the points' velocities, and a
 // rigid motion of the vertices moves strands rigidly.
 #pragma once

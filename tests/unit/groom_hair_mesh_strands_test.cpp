@@ -263,6 +263,29 @@ TEST(HairMeshStrands, CurlIsAHelixThatGrows) {
   }
 }
 
+// A lean of the whole mesh leaves offsets as they are until its prisms are nearly flat; then there are none,
+// and what the mesh does throws no point far.
+TEST(HairMeshStrands, OffsetsFadeWherePrismsAreNearlyFlat) {
+  HairMeshStrandsDesc plain, curly;
+  plain.strands = curly.strands = 50;
+  curly.curl_radius = 0.002, curly.curl_turns = 2;
+  const auto most_apart = [&](double lean, double straightened) {
+    HairMesh mesh = slab(2, 2, 4, 0.02, 0.03);
+    for (Vec3& x : mesh.positions) x.x() += lean * x.z();
+    const HairMeshStrands with(mesh, curly, ""), without(mesh, plain, "");
+    for (Vec3& x : mesh.positions) x.x() -= straightened * x.z();
+    std::vector<Vec3> a(50 * with.points()), b(a.size());
+    with.place(mesh.positions, a), without.place(mesh.positions, b);
+    double most = 0;
+    for (std::size_t i = 0; i < a.size(); ++i) most = std::max(most, (a[i] - b[i]).norm());
+    return most;
+  };
+  EXPECT_NEAR(most_apart(0, 0), 0.002, 2e-6);
+  EXPECT_NEAR(most_apart(2, 0), 0.002, 2e-6);
+  EXPECT_EQ(most_apart(20, 0), 0);
+  for (const double lean : {2.0, 3.0, 5.0, 8.0, 20.0}) EXPECT_LT(most_apart(lean, lean), 3 * 0.002) << lean;
+}
+
 TEST(HairMeshStrands, NoiseHasItsRootMeanSquare) {
   HairMeshStrandsDesc desc = with_strands(4000, 8);
   const HairMesh mesh = slab(3, 2, 6, 0.02, 0.03);

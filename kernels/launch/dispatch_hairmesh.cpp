@@ -20,27 +20,42 @@ HairMeshSolver<T>::~HairMeshSolver() = default;
 template class HairMeshSolver<float>;
 template class HairMeshSolver<double>;
 
+namespace {
+
+template <class T>
+using Maker = HairMeshSolver<T>* (*)(const HairMeshView<T>& mesh);
+
+template <class T>
+struct Makers {
+  Maker<T> generic, avx2, avx512;
+};
+template <class T>
+constexpr Makers<T> kMakers{};
 template <>
-std::unique_ptr<HairMeshSolver<float>> make_hair_mesh_solver(InstructionSet set,
-                                                             const HairMeshTopology& topology,
-                                                             const std::vector<double>& rest,
-                                                             const HairMeshParameters& parameters) {
-  const HairMeshModel<float> model(topology, rest, parameters);
-  const auto make = set == InstructionSet::kAvx512 ? avx512::new_float_mesh
-                    : set == InstructionSet::kAvx2 ? avx2::new_float_mesh
-                                                   : generic::new_float_mesh;
-  return std::unique_ptr<HairMeshSolver<float>>(make(model.view()));
-}
+constexpr Makers<float> kMakers<float>{generic::new_float_mesh, avx2::new_float_mesh, avx512::new_float_mesh};
 template <>
-std::unique_ptr<HairMeshSolver<double>> make_hair_mesh_solver(InstructionSet set,
-                                                              const HairMeshTopology& topology,
-                                                              const std::vector<double>& rest,
-                                                              const HairMeshParameters& parameters) {
-  const HairMeshModel<double> model(topology, rest, parameters);
-  const auto make = set == InstructionSet::kAvx512 ? avx512::new_double_mesh
-                    : set == InstructionSet::kAvx2 ? avx2::new_double_mesh
-                                                   : generic::new_double_mesh;
-  return std::unique_ptr<HairMeshSolver<double>>(make(model.view()));
+constexpr Makers<double> kMakers<double>{generic::new_double_mesh, avx2::new_double_mesh,
+                                         avx512::new_double_mesh};
+
+}  // namespace
+
+template <class T>
+std::unique_ptr<HairMeshSolver<T>> make_hair_mesh_solver(InstructionSet set, const HairMeshTopology& topology,
+                                                         const std::vector<double>& rest,
+                                                         const HairMeshParameters& parameters) {
+  const HairMeshModel<T> model(topology, rest, parameters);
+  const Maker<T> make = set == InstructionSet::kAvx512 ? kMakers<T>.avx512
+                        : set == InstructionSet::kAvx2 ? kMakers<T>.avx2
+                                                       : kMakers<T>.generic;
+  return std::unique_ptr<HairMeshSolver<T>>(make(model.view()));
 }
+
+template std::unique_ptr<HairMeshSolver<float>> make_hair_mesh_solver(InstructionSet, const HairMeshTopology&,
+                                                                      const std::vector<double>&,
+                                                                      const HairMeshParameters&);
+template std::unique_ptr<HairMeshSolver<double>> make_hair_mesh_solver(InstructionSet,
+                                                                       const HairMeshTopology&,
+                                                                       const std::vector<double>&,
+                                                                       const HairMeshParameters&);
 
 }  // namespace ringlet::kernels

@@ -44,7 +44,7 @@ std::optional<Problem> out_of_range(const HairExtrusion& extrusion);
 HairMesh extrude_hair_mesh(const HairExtrusion& extrusion, const ScalpPatch& patch,
                            const SignedDistance& head);
 
-// ---- The paper's hair styles (hair_mesh_paper.txt, section 4, Figures 1 and 6)
+// ---- The paper's hair styles (Wu and Yuksel 2016, section 4, Figures 1 and 6)
 // ------------------------------
 
 enum class HairStyle { kShort, kShoulder, kLong };

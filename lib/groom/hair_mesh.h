@@ -1,4 +1,4 @@
-// Hair meshes (Yuksel et al. 2009; hair_mesh_paper.txt, section 3): a polygon mesh on the scalp extruded
+// Hair meshes (Yuksel et al. 2009; Wu and Yuksel 2016, section 3): a polygon mesh on the scalp extruded
 // through layers. Over each face stands a bundle, a column of prisms with one prism between any two layers;
 // strands are made through the layers (hair_mesh_strands.h).
 #pragma once
@@ -36,7 +36,7 @@ struct HairMesh {
 };
 
 // Six times the signed volume [m^3] of the corner tetrahedron at a corner of a prism: of the three edges that
-// meet there (hair_mesh_paper.txt, Figure 3c). `top`: at the upper layer's corner. Positive where the prism
+// meet there (Wu and Yuksel 2016, Figure 3c). `top`: at the upper layer's corner. Positive where the prism
 // is not inverted there.
 double corner_determinant(const HairMesh& mesh, std::size_t face, int lower_layer, int corner, bool top);
 

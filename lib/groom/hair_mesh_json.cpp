@@ -7,63 +7,18 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "core/error.h"
+#include "core/json_text.h"
 #include "groom/hair_mesh_formats.h"
 
 namespace ringlet::groom {
 
 namespace {
-using Json = nlohmann::json;
-
 constexpr const char* kFormat = "ringlet-hair-mesh";
 constexpr int kVersion = 1;
 constexpr const char* kAxes[] = {"x", "y", "z"};
 constexpr std::pair<const char*, double> kUnits[] = {
     {"m", 1}, {"cm", 0.01}, {"mm", 0.001}, {"in", 0.0254}, {"ft", 0.3048}};
-constexpr std::size_t kBrief = 60;        // characters of a value in a message
 constexpr std::size_t kMostProblems = 8;  // of a file's contents
-constexpr int kDeepest = 8;               // levels; a hair mesh needs three
-
-std::string brief(const Json& value) {
-  const std::string text = value.dump(-1, ' ', true, Json::error_handler_t::replace);
-  return text.size() <= kBrief ? text : text.substr(0, kBrief - 3) + "...";
-}
-
-std::string line_and_column(std::string_view text, std::size_t read) {
-  const std::string_view before = text.substr(0, std::min(read == 0 ? 0 : read - 1, text.size()));
-  const auto line = 1 + std::count(before.begin(), before.end(), '\n');
-  return fmt::format("{}:{}", line, before.size() - (before.rfind('\n') + 1) + 1);  // npos + 1 is 0
-}
-
-// The parser's message without its exception id and without the position, which is told in our own form.
-std::string without_prefix(std::string message) {
-  message.erase(0, message.find("] ") + 2);
-  if (message.starts_with("parse error")) message.erase(0, message.find(": ") + 2);
-  return message;
-}
-
-// Refuses what the library would let pass: the last of two equal keys would win.
-Json parse_json(std::string_view text, const std::string& name) {
-  std::vector<std::set<std::string>> keys;
-  const Json::parser_callback_t watch = [&](int depth, Json::parse_event_t event, Json& value) {
-    if (depth > kDeepest)
-      throw Error(ErrorKind::kInput, name, fmt::format("nested deeper than {} levels", kDeepest));
-    if (event == Json::parse_event_t::object_start) keys.emplace_back();
-    if (event == Json::parse_event_t::object_end) keys.pop_back();
-    if (event == Json::parse_event_t::key && !keys.back().insert(value.get<std::string>()).second)
-      throw Error(ErrorKind::kInput, name, fmt::format("the key {} is given twice", brief(value)),
-                  "keep one of them");
-    return true;
-  };
-  try {
-    return Json::parse(text, watch);
-  } catch (const Json::parse_error& error) {
-    throw Error(ErrorKind::kInput, name + ":" + line_and_column(text, error.byte),
-                without_prefix(error.what()));
-  } catch (const Json::exception& error) {  // a number beyond double
-    throw Error(ErrorKind::kInput, name, without_prefix(error.what()));
-  }
-}
 
 class Reader {
  public:

@@ -1,4 +1,4 @@
-// Strands through the layers of a hair mesh (hair_mesh_paper.txt, section 4; Yuksel et al. 2009).
+// Strands through the layers of a hair mesh (Wu and Yuksel 2016, section 4; Yuksel et al. 2009).
 //
 // A root lies at (u, v) of a scalp face: x(u, v) is linear in a triangle and bilinear in a quad. The same
 // weights on each layer give the control points P_k(u, v) of a strand, and a curve C(u, v, t) = sum_k h_k(t)

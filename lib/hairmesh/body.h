@@ -1,4 +1,4 @@
-// One groom's hair mesh under simulation (physics.md section 8; hair_mesh_paper.txt): the solver of
+// One groom's hair mesh under simulation (physics.md section 8; Wu and Yuksel 2016): the solver of
 // kernels/hairmesh in the scene's terms.
 #pragma once
 #include <cstddef>

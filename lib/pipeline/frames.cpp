@@ -7,12 +7,13 @@
 #include <cmath>
 
 namespace ringlet::pipeline {
-namespace {
 
 bool asks_for(const scene::Scene& scene, const char* field) {
   const auto& fields = scene.cache.fields;
   return std::find(fields.begin(), fields.end(), field) != fields.end();
 }
+
+namespace {
 
 const StrandSet& strands_of_cache(const World& world) {
   return world.interpolated ? world.interpolated->all : world.simulated;

@@ -8,6 +8,9 @@
 
 namespace ringlet::pipeline {
 
+// Whether the scene's cache is to have this field.
+bool asks_for(const scene::Scene& scene, const char* field);
+
 // Everything but the machine and the range of frames.
 state::RunHeader make_header(const scene::Scene& scene, const World& world);
 

@@ -10,7 +10,6 @@
 #include "core/timer.h"
 #include "effects/instruction_set.h"
 #include "effects/wind/wind_field.h"
-#include "groom/hair_mesh_strands.h"
 #include "hairmesh/body.h"
 #include "pipeline/frames.h"
 #include "pipeline/world.h"
@@ -22,7 +21,7 @@ namespace {
 // One groom: its mesh, the strands through it, and where its roots go.
 template <class T>
 struct Part {
-  groom::HairMeshStrands strands;
+  const groom::HairMeshStrands& strands;
   Roots roots;  // of the mesh's columns
   std::vector<Pose> poses;
   std::vector<Vec3> air;  // [vertices] [m/s]; empty: still
@@ -31,9 +30,10 @@ struct Part {
 };
 
 template <class T>
-Part<T> make_part(const scene::Scene& scene, const World& world, const scene::Groom& desc,
+Part<T> make_part(const scene::Scene& scene, const World& world, std::size_t index,
                   kernels::InstructionSet set) {
-  const groom::HairMesh mesh = groom::read_scene_hair_mesh(desc, scene.units);
+  const scene::Groom& desc = scene.grooms[index];
+  const auto& [mesh, strands] = world.hair_meshes[index];
   groom::Strands columns = hairmesh::columns_of(mesh);
   std::vector<Vec3> rest(mesh.layer(0).begin(), mesh.layer(0).end());
   Roots roots(world.head.get(), scene.frames);
@@ -46,7 +46,7 @@ Part<T> make_part(const scene::Scene& scene, const World& world, const scene::Gr
   hairmesh::Body<T> body(mesh, *scene.model.hair_mesh, poses, set);
   log_info(fmt::format("groom \"{}\": hair mesh of {} faces, {} layers, {} vertices, {} prisms", desc.name,
                        mesh.faces.size(), mesh.layers, mesh.positions.size(), mesh.prisms()));
-  return {groom::scene_strands(desc, mesh), std::move(roots), std::move(poses), {}, std::move(body), 0, 0};
+  return {strands, std::move(roots), std::move(poses), {}, std::move(body), 0, 0};
 }
 
 template <class T>
@@ -57,14 +57,14 @@ class HairMeshSimulation : public Simulation {
         set_(effects::choose_instruction_set(options.instruction_set)),
         world_(build_world(scene_)) {
     std::int64_t strands = 0, particles = 0;
-    for (const scene::Groom& desc : scene_.grooms) {
-      Part<T>& part = parts_.emplace_back(make_part<T>(scene_, world_, desc, set_));
+    for (std::size_t k = 0; k < scene_.grooms.size(); ++k) {
+      Part<T>& part = parts_.emplace_back(make_part<T>(scene_, world_, k, set_));
       part.first_strand = strands, part.first_particle = particles;
       strands += static_cast<std::int64_t>(part.strands.size());
       particles += static_cast<std::int64_t>(part.strands.size()) * part.strands.points();
     }
     points_.resize(static_cast<std::size_t>(particles));
-    if (asks_for_velocity()) speeds_.resize(points_.size());
+    if (asks_for(scene_, "velocity")) speeds_.resize(points_.size());
     if (scene_.effects.wind) {
       wind_.emplace(*scene_.effects.wind, scene_.frames, parts_[0].body.origin());
       for (Part<T>& part : parts_) part.air.resize(part.body.positions().size());
@@ -87,22 +87,16 @@ class HairMeshSimulation : public Simulation {
   bool run(const FrameRange& range, state::FrameSink& sink, const RunControl& control) override;
 
  private:
-  bool asks_for_velocity() const {
-    const auto& fields = scene_.cache.fields;
-    return std::find(fields.begin(), fields.end(), "velocity") != fields.end();
-  }
   bool has_solids() const { return !world_.solids.empty() || !scene_.model.hair_mesh->ellipsoids.empty(); }
-  double time_of(int frame, int substep) const {
-    const double n = static_cast<double>(frame - scene_.frames.first) * scene_.model.substeps + substep;
-    return n / (scene_.frames.fps * scene_.model.substeps);
-  }
+  double time_of(int frame, int substep) const { return pipeline::time_of(scene_, frame, substep); }
 
   void make_plan(std::int64_t strands, std::int64_t particles);
   void step_frame(int frame);
   void substep(int frame, double before, double now);
   void blow(double time);
-  std::vector<kernels::MeshEllipsoid<T>> ellipsoids(const Part<T>& part, double before, double now) const;
-  Pose carrier(const scene::Ellipsoid& ellipsoid, double time) const;
+  void collide(double before, double now);
+  Pose head_at(double time) const;
+  Pose carrier(const scene::Ellipsoid& ellipsoid, const Pose& head, double time) const;
   void check(int frame);
   state::Frame frame_now(int frame);
   state::Figures figures() const;
@@ -135,12 +129,10 @@ void HairMeshSimulation<T>::make_plan(std::int64_t strands, std::int64_t particl
   plan_.frames = scene_.frames.last - scene_.frames.first + scene_.frames.preroll;
   std::size_t bodies = 0, roots = 0, air = 0, generators = (points_.size() + speeds_.size()) * sizeof(Vec3),
               solids = 0;
-  bool still = true;
   for (const Part<T>& part : parts_) {
     bodies += part.body.bytes(), roots += part.poses.size() * sizeof(Pose),
         air += part.air.size() * sizeof(Vec3);
     generators += part.strands.bytes();
-    still = still && part.roots.still();
   }
   for (const solids::Solid& solid : world_.solids) solids += solid.bytes();
   const auto add = [&](const char* name, const char* what, bool runs, std::size_t bytes) {
@@ -170,31 +162,38 @@ void HairMeshSimulation<T>::blow(double time) {
     });
 }
 
-// What takes an ellipsoid from where it is at rest to where it is at a time.
+// How the head as a whole has been carried from rest.
 template <class T>
-Pose HairMeshSimulation<T>::carrier(const scene::Ellipsoid& ellipsoid, double time) const {
-  if (ellipsoid.follows_head && world_.head) {
-    if (world_.head->motion() != solids::AnimatedMesh::Motion::kDeforming) return world_.head->pose(time);
-    std::vector<Vec3> vertices(world_.head->vertex_count());
-    world_.head->sample(time, vertices);
-    return world_.head->nearest_pose(vertices);
-  }
-  scene::Animation motion;
-  motion.carrier = scene_.grooms[0].animation.carrier;
-  motion.carrier_interpolation = scene_.grooms[0].animation.carrier_interpolation;
-  motion.speed = scene_.grooms[0].animation.speed;
-  const solids::Similarity moved = solids::sample_animation(motion, scene_.frames, time);
+Pose HairMeshSimulation<T>::head_at(double time) const {
+  if (!world_.head) return {};
+  if (world_.head->motion() != solids::AnimatedMesh::Motion::kDeforming) return world_.head->pose(time);
+  std::vector<Vec3> vertices(world_.head->vertex_count());
+  world_.head->sample(time, vertices);
+  return world_.head->nearest_pose(vertices);
+}
+
+template <class T>
+Pose HairMeshSimulation<T>::carrier(const scene::Ellipsoid& ellipsoid, const Pose& head, double time) const {
+  if (ellipsoid.follows_head && world_.head) return head;
+  const solids::Similarity moved = solids::sample_animation(ellipsoid.motion, scene_.frames, time);
   return {moved.rotate.toRotationMatrix(), moved.translate};
 }
 
 template <class T>
-std::vector<kernels::MeshEllipsoid<T>> HairMeshSimulation<T>::ellipsoids(const Part<T>& part, double before,
-                                                                         double now) const {
-  std::vector<kernels::MeshEllipsoid<T>> moving;
-  for (const scene::Ellipsoid& ellipsoid : scene_.model.hair_mesh->ellipsoids)
-    moving.push_back(hairmesh::moving_ellipsoid<T>(
-        ellipsoid, carrier(ellipsoid, before), carrier(ellipsoid, now), part.body.origin(), now - before));
-  return moving;
+void HairMeshSimulation<T>::collide(double before, double now) {
+  std::vector<kernels::SolidView> views;
+  for (solids::Solid& solid : world_.solids) views.push_back(solid.at(before, now));
+  const auto& ellipsoids = scene_.model.hair_mesh->ellipsoids;
+  const Pose head_before = ellipsoids.empty() ? Pose{} : head_at(before),
+             head_now = ellipsoids.empty() ? Pose{} : head_at(now);
+  for (Part<T>& part : parts_) {
+    std::vector<kernels::MeshEllipsoid<T>> moving;
+    for (const scene::Ellipsoid& ellipsoid : ellipsoids)
+      moving.push_back(hairmesh::moving_ellipsoid<T>(ellipsoid, carrier(ellipsoid, head_before, before),
+                                                     carrier(ellipsoid, head_now, now), part.body.origin(),
+                                                     now - before));
+    part.body.collide(views, moving, taken_);
+  }
 }
 
 template <class T>
@@ -212,11 +211,7 @@ void HairMeshSimulation<T>::substep(int frame, double before, double now) {
   });
   check(frame);
   if (!has_solids()) return;
-  timed("solids", [&] {
-    std::vector<kernels::SolidView> views;
-    for (solids::Solid& solid : world_.solids) views.push_back(solid.at(before, now));
-    for (Part<T>& part : parts_) part.body.collide(views, ellipsoids(part, before, now), taken_);
-  });
+  timed("solids", [&] { collide(before, now); });
   if (scene_.model.hair_mesh->deformation_minimisation)
     timed("minimisation", [&] {
       for (Part<T>& part : parts_) part.body.minimise(taken_);

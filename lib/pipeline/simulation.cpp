@@ -144,11 +144,7 @@ class TypedSimulation : public Simulation {
     return make_frame(scene_, world_, model_, state_, frame, time_of(frame, 0));
   }
 
-  // Substep boundaries are quotients of integers: the same bits however a run got there.
-  double time_of(int frame, int substep) const {
-    const double n = static_cast<double>(frame - scene_.frames.first) * scene_.model.substeps + substep;
-    return n / (scene_.frames.fps * scene_.model.substeps);
-  }
+  double time_of(int frame, int substep) const { return pipeline::time_of(scene_, frame, substep); }
 
   scene::Scene scene_;
   Options options_;

@@ -17,6 +17,11 @@ namespace ringlet::pipeline {
 
 double first_time(const scene::Frames& frames) { return -frames.preroll / frames.fps; }
 
+double time_of(const scene::Scene& scene, int frame, int substep) {
+  const double n = static_cast<double>(frame - scene.frames.first) * scene.model.substeps + substep;
+  return n / (scene.frames.fps * scene.model.substeps);
+}
+
 groom::Scalp scalp_of(const solids::AnimatedMesh& head) {
   return {head.rest_vertices(), head.triangles(), head.mesh_of_triangle(), head.mesh_names()};
 }
@@ -248,11 +253,20 @@ groom::Strands with_room(const scene::Scene& scene, const scene::Groom& desc, co
   return roomy;
 }
 
+groom::Strands strands_of(const scene::Scene& scene, const scene::Groom& desc, const groom::Scalp* scalp,
+                          World& world) {
+  if (scene.model.type != scene::ModelType::kHairMesh) return groom::build(desc, scene.units, scalp);
+  groom::HairMesh mesh = groom::read_scene_hair_mesh(desc, scene.units);
+  groom::HairMeshStrands strands = groom::scene_strands(desc, mesh);
+  world.hair_meshes.push_back({std::move(mesh), std::move(strands)});
+  return world.hair_meshes.back().strands.strands();
+}
+
 void build_groom(const scene::Scene& scene, std::size_t index, bool scales_stiffness, World& world) {
   const scene::Groom& desc = scene.grooms[index];
   const std::optional<groom::Scalp> scalp =
       world.head ? std::optional<groom::Scalp>(scalp_of(*world.head)) : std::nullopt;
-  Held held{groom::build(desc, scene.units, scalp ? &*scalp : nullptr), std::nullopt, {}, {}};
+  Held held{strands_of(scene, desc, scalp ? &*scalp : nullptr, world), std::nullopt, {}, {}};
   groom::Strands& strands = held.strands;
   if (strands.widths.empty()) strands.widths.assign(strands.points.size(), static_cast<float>(desc.width));
   held.guides.assign(strands.size(), 1);

@@ -6,6 +6,7 @@
 
 #include "effects/solids/contact_stage.h"
 #include "groom/groom.h"
+#include "groom/hair_mesh_strands.h"
 #include "groom/interpolation.h"
 #include "pipeline/roots.h"
 #include "scene/scene_desc.h"
@@ -29,6 +30,12 @@ struct Interpolated {
   groom::Interpolation interpolation;
 };
 
+// A groom's hair mesh, and the strands through it.
+struct HairMeshGroom {
+  groom::HairMesh mesh;
+  groom::HairMeshStrands strands;
+};
+
 struct World {
   std::unique_ptr<solids::AnimatedMesh> head;     // null: none
   std::deque<solids::AnimatedMesh> solid_meshes;  // solids' own meshes and proxies
@@ -41,6 +48,7 @@ struct World {
                                      // strand, there is room for that at its tip
   std::vector<float> stiffness;      // [particles * kCouplings] where a groom scales it, else empty
   std::unique_ptr<Interpolated> interpolated;       // null where no groom does
+  std::vector<HairMeshGroom> hair_meshes;           // of all grooms with the model hair_mesh, else empty
   const solids::AnimatedMesh* home_mesh = nullptr;  // what collides as the head
   effects::Skin skin;                               // what they grow on among the solids
 
@@ -55,5 +63,9 @@ groom::Scalp scalp_of(const solids::AnimatedMesh& head);
 
 // The run's first time: minus the preroll [s].
 double first_time(const scene::Frames& frames);
+
+// When substep `substep` on the way from `frame` to the next begins [s]. Quotients of integers: the same bits
+// however a run got there.
+double time_of(const scene::Scene& scene, int frame, int substep);
 
 }  // namespace ringlet::pipeline

@@ -98,15 +98,21 @@ class Builder {
                                {{"smooth", Interpolation::kSmooth}, {"linear", Interpolation::kLinear}});
   }
 
-  // Of a mesh, or of a groom, whose animation has no clip.
-  Animation animation(const Json& block) const {
+  // Of what has no animation of its own.
+  Animation motion() const {
     const Json& motion = document_["motion"];
-    Animation animation;
-    animation.keys = keys(block["keys"]);
-    animation.interpolation = interpolation(block);
+    Animation animation{};
     animation.carrier = keys(motion["keys"]);
     animation.carrier_interpolation = interpolation(motion);
     animation.speed = motion["speed"];
+    return animation;
+  }
+
+  // Of a mesh, or of a groom, whose animation has no clip.
+  Animation animation(const Json& block) const {
+    Animation animation = motion();
+    animation.keys = keys(block["keys"]);
+    animation.interpolation = interpolation(block);
     animation.clip = optional<std::string>(block, "clip");
     animation.loop = block.contains("loop") && block["loop"].get<bool>();
     return animation;
@@ -221,7 +227,7 @@ class Builder {
     return model;
   }
 
-  static HairMeshModel hair_mesh_model(const Json& block) {
+  HairMeshModel hair_mesh_model(const Json& block) const {
     HairMeshModel model;
     model.density = block["density"];
     model.stretch = block["stretch"], model.stretch_across = block["stretch_across"];
@@ -234,7 +240,7 @@ class Builder {
         block["start"], {{"rest", HairMeshStart::kRest}, {"collapsed", HairMeshStart::kCollapsed}});
     for (const Json& ellipsoid : block["ellipsoids"])
       model.ellipsoids.push_back({vec3(ellipsoid["centre"]), vec3(ellipsoid["radii"]),
-                                  rotation(ellipsoid["rotate"]), ellipsoid["follow"] == "head",
+                                  rotation(ellipsoid["rotate"]), ellipsoid["follow"] == "head", motion(),
                                   ellipsoid["friction"]});
     return model;
   }

@@ -2,7 +2,7 @@
 #pragma once
 #include <string>
 
-#include "scene/json_text.h"
+#include "core/json_text.h"
 
 namespace ringlet::scene {
 

@@ -172,7 +172,8 @@ struct Ellipsoid {  // at rest
   Vec3 radii;       // [m]
   Quat rotation;    // of its axes from the scene's
   bool follows_head;
-  double friction;  // Coulomb mu [-]
+  Animation motion;  // the scene's alone, for one that does not
+  double friction;   // Coulomb mu [-]
 };
 
 enum class HairMeshStart { kRest, kCollapsed };

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "scene/json_text.h"
+#include "core/json_text.h"
 
 namespace ringlet::scene {
 

@@ -6,24 +6,13 @@ import numpy as np
 import pytest
 
 from conftest import run
-from tiny import LAST, RADIUS, frame_bytes, write_scene
+from tiny import LAST, RADIUS, figures, steps, write_scene
 from tiny_mesh import ACROSS, LAYERS, write_mesh_scene
 
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory):
     return write_mesh_scene(tmp_path_factory.mktemp("mesh"))
-
-
-def steps(program, scene, out, *options):
-    result = run(program, "run", scene, "-o", out, "--progress", "none", *options)
-    assert result.returncode == 0, result.stderr
-    return frame_bytes(out)
-
-
-def figures(out, name):
-    with h5py.File(out / "tiny.h5") as cache:
-        return cache["figures"][name][:]
 
 
 def positions(out, frame):

@@ -7,20 +7,9 @@ import pytest
 
 from conftest import run
 from small_cache import ball
-from tiny import LAST, PARTICLES, RADIUS, STRANDS, frame_bytes, write_mesh, write_scene
+from tiny import LAST, PARTICLES, RADIUS, STRANDS, figures, steps, write_mesh, write_scene
 
 RIDE = [{"frame": 1}, {"frame": 5, "translate": [0.1, 0, 0], "rotate": [0, 0.5, 0, 0.8]}]
-
-
-def steps(program, scene, out, *options):
-    result = run(program, "run", scene, "-o", out, "--progress", "none", *options)
-    assert result.returncode == 0, result.stderr
-    return frame_bytes(out)
-
-
-def figures(out, name):
-    with h5py.File(out / "tiny.h5") as cache:
-        return cache["figures"][name][:]
 
 
 # ---- mass-spring

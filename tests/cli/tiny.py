@@ -3,8 +3,10 @@ import copy
 import json
 import struct
 
+import h5py
 import numpy as np
 
+from conftest import run
 from small_cache import ball
 
 RADIUS = 0.1  # of the head [m]
@@ -85,3 +87,16 @@ def write_scene(directory, change=lambda scene: None, groom=None):
 def frame_bytes(directory):
     """The bytes of every frame file by its name."""
     return {path.name: path.read_bytes() for path in sorted(directory.glob("tiny.[0-9]*.h5"))}
+
+
+def steps(program, scene, out, *options):
+    """Runs the scene; the bytes of its frames."""
+    result = run(program, "run", scene, "-o", out, "--progress", "none", *options)
+    assert result.returncode == 0, result.stderr
+    return frame_bytes(out)
+
+
+def figures(out, name):
+    """[frames] a figure of the solver."""
+    with h5py.File(out / "tiny.h5") as cache:
+        return cache["figures"][name][:]

@@ -7,7 +7,7 @@
 
 #include "core/error.h"
 
-namespace ringlet::scene {
+namespace ringlet {
 
 using Json = nlohmann::json;
 
@@ -23,4 +23,4 @@ std::string brief(const Json& value);
 std::string pointer_token(std::string_view token);
 std::string pointer_token(std::size_t index);
 
-}  // namespace ringlet::scene
+}  // namespace ringlet

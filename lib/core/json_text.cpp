@@ -1,15 +1,16 @@
-#include "scene/json_text.h"
+#include "core/json_text.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-namespace ringlet::scene {
+namespace ringlet {
 namespace {
 
-constexpr std::size_t kDeepest = 64;  // levels; a scene needs ten, and recursion over a value must end
-constexpr std::size_t kBrief = 60;    // characters
+constexpr std::size_t kDeepest =
+    64;  // levels; a scene needs ten, a hair mesh three, and recursion over a value must end
+constexpr std::size_t kBrief = 60;  // characters
 
 // `LINE:COLUMN` (from 1, in bytes) of the last of the `read` characters that the parser has consumed.
 std::string line_and_column(std::string_view text, std::size_t read) {
@@ -28,7 +29,7 @@ std::string without_prefix(std::string message) {
 
 // Builds the value from the parser's events. The library's own builder lets the last of two equal keys win
 // and its parser throws away the position of a number that is too large; both matter to somebody who edits a
-// scene by hand.
+// file by hand.
 class Builder : public nlohmann::json_sax<Json> {
  public:
   Builder(std::string_view text, std::string name) : text_(text), name_(std::move(name)) {}
@@ -144,4 +145,4 @@ std::string pointer_token(std::string_view token) {
 
 std::string pointer_token(std::size_t index) { return "/" + std::to_string(index); }
 
-}  // namespace ringlet::scene
+}  // namespace ringlet

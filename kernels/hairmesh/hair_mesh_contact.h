@@ -46,22 +46,100 @@ RINGLET_FUNCTION void nearest_on_ellipsoid(const double (&radius)[3], const doub
   if (!(root > 0)) y[shortest] = radius[shortest] * sqrt(max(left, 0.0));
 }
 
-// As MeshSurface::find asks.
+RINGLET_FUNCTION double length_of(const double (&a)[3]) {
+  return sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
+}
+
+// A point as the ellipsoid sees it, in its axes, when a share `left` of the step is still to come.
 template <class T>
-RINGLET_FUNCTION bool find_on_ellipsoid(const MeshEllipsoid<T>& e, const T* point, T reach,
-                                        MeshSurfacePoint<T>& found) {
-  double from[3], p[3], radius[3], y[3];
-  for (int k = 0; k < 3; ++k) from[k] = double(point[k]) - double(e.centre[k]), radius[k] = e.radius[k];
-  double within = 0, farther = 0;
+RINGLET_FUNCTION void in_ellipsoid_axes(const MeshEllipsoid<T>& e, const double (&x)[3], double step,
+                                        double left, double (&p)[3]) {
+  double from[3], turn[3];
   for (int k = 0; k < 3; ++k) {
-    p[k] = from[0] * e.axis[k][0] + from[1] * e.axis[k][1] + from[2] * e.axis[k][2];
-    const double near = p[k] / radius[k], far = p[k] / (radius[k] + double(reach));
-    within += near * near, farther += far * far;
+    from[k] = x[k] - double(e.centre[k]) + left * step * double(e.velocity[k]);
+    turn[k] = e.turn[k];
   }
-  if (!(farther < 1))
-    return false;  // the ellipsoid of longer radii holds all that is within reach, and little else
+  // Turned as the ellipsoid has still to turn: between unit quaternions, normalised.
+  const double sine = length_of(turn), cosine = sqrt(max(1 - sine * sine, 0.0));
+  const double w = 1 + left * (cosine - 1), size = sqrt(w * w + left * sine * left * sine);
+  double once[3];
+  for (int k = 0; k < 3; ++k) turn[k] *= left / size;
+  for (int k = 0; k < 3; ++k) {
+    const int i = (k + 1) % 3, j = (k + 2) % 3;
+    once[k] = 2 * (turn[i] * from[j] - turn[j] * from[i]);
+  }
+  for (int k = 0; k < 3; ++k) {
+    const int i = (k + 1) % 3, j = (k + 2) % 3;
+    from[k] += w / size * once[k] + (turn[i] * once[j] - turn[j] * once[i]);
+  }
+  for (int k = 0; k < 3; ++k) p[k] = from[0] * e.axis[k][0] + from[1] * e.axis[k][1] + from[2] * e.axis[k][2];
+}
+
+// Below 1: inside.
+RINGLET_FUNCTION double ellipsoid_level(const double (&radius)[3], const double (&p)[3]) {
+  double level = 0;
+  for (int k = 0; k < 3; ++k) level += (p[k] / radius[k]) * (p[k] / radius[k]);
+  return level;
+}
+
+// The share of the way from a, outside, to b at which it enters the ellipsoid; above 1 where it does not.
+RINGLET_FUNCTION double entry_into_ellipsoid(const double (&radius)[3], const double (&a)[3],
+                                             const double (&b)[3]) {
+  double square = 0, along = 0, level = -1;
+  for (int k = 0; k < 3; ++k) {
+    const double way = (b[k] - a[k]) / radius[k], from = a[k] / radius[k];
+    square += way * way, along += way * from, level += from * from;
+  }
+  const double discriminant = along * along - square * level;
+  if (!(along < 0 && discriminant > 0)) return 2;
+  return max(level, 0.0) / (sqrt(discriminant) - along);
+}
+
+// Where a vertex that entered the ellipsoid on its way would have slid to by the step's end: on from the
+// entry without what would have led it farther in. False where it did not enter, or was deeper than `skin`
+// inside before [m].
+template <class T>
+RINGLET_FUNCTION bool slide_on_ellipsoid(const MeshEllipsoid<T>& e, const double (&radius)[3],
+                                         const double (&before)[3], const double (&point)[3], double step,
+                                         double skin, double (&p)[3]) {
+  constexpr int kPieces = 16;  // of half a turn, each taken for straight
+  const double turn[3] = {double(e.turn[0]), double(e.turn[1]), double(e.turn[2])};
+  const int pieces = 1 + static_cast<int>(kPieces * length_of(turn));
+  double from[3], to[3], end[3];
+  in_ellipsoid_axes(e, before, step, 1.0, from), in_ellipsoid_axes(e, point, step, 0.0, end);
+  if (ellipsoid_level(radius, from) < 1) {
+    double above[3];
+    nearest_on_ellipsoid(radius, from, to);
+    for (int k = 0; k < 3; ++k) above[k] = to[k] - from[k], from[k] = to[k];
+    if (length_of(above) > skin) return false;
+  }
+  for (int i = 1; i <= pieces; ++i) {
+    const double share = double(i) / pieces;
+    double x[3];
+    for (int k = 0; k < 3; ++k) x[k] = before[k] + share * (point[k] - before[k]);
+    in_ellipsoid_axes(e, x, step, 1 - share, to);
+    const double entered = entry_into_ellipsoid(radius, from, to);
+    if (entered < 1) {
+      double normal[3], square = 0, inwards = 0;
+      for (int k = 0; k < 3; ++k) {
+        p[k] = from[k] + entered * (to[k] - from[k]);
+        normal[k] = p[k] / (radius[k] * radius[k]), square += normal[k] * normal[k];
+      }
+      for (int k = 0; k < 3; ++k) inwards += normal[k] * (end[k] - p[k]);
+      for (int k = 0; k < 3; ++k) p[k] = end[k] - min(inwards, 0.0) / square * normal[k];
+      return true;
+    }
+    for (int k = 0; k < 3; ++k) from[k] = to[k];
+  }
+  return false;
+}
+
+// The ellipsoid's surface nearest p, in its axes.
+template <class T>
+RINGLET_FUNCTION void surface_of_ellipsoid(const MeshEllipsoid<T>& e, const double (&radius)[3],
+                                           const double (&p)[3], MeshSurfacePoint<T>& found) {
+  double y[3], normal[3], square = 0;
   nearest_on_ellipsoid(radius, p, y);
-  double normal[3], square = 0;
   for (int k = 0; k < 3; ++k) normal[k] = y[k] / (radius[k] * radius[k]), square += normal[k] * normal[k];
   const double scale = 1 / sqrt(square);
   double arm[3];
@@ -76,7 +154,42 @@ RINGLET_FUNCTION bool find_on_ellipsoid(const MeshEllipsoid<T>& e, const T* poin
     found.velocity[i] = static_cast<T>(e.velocity[i] + e.spin[j] * arm[k] - e.spin[k] * arm[j]);
   }
   found.friction = e.friction;
-  return true;
+}
+
+// As MeshSurface::find asks, over a step of `step` [s]. A point inside is moved to the nearest surface, one
+// nearer to the far side, or through it, to where it slides from its entry.
+template <class T>
+RINGLET_FUNCTION bool find_on_ellipsoid(const MeshEllipsoid<T>& e, const T* before, const T* point, T reach,
+                                        double step, MeshSurfacePoint<T>& found) {
+  // That counts as the surface: of the shortest radius, and of how deep inside may be.
+  constexpr double kSkin = 0.02, kDeeper = 1.5;
+  double start[3], end[3], p[3], slid[3], radius[3], way[3], turn[3], widest = 0,
+                                                                      shortest = double(e.radius[0]);
+  for (int k = 0; k < 3; ++k) {
+    start[k] = before[k], end[k] = point[k], radius[k] = e.radius[k], turn[k] = e.turn[k];
+    way[k] = end[k] - start[k] - step * double(e.velocity[k]);
+    widest = max(widest, radius[k]), shortest = min(shortest, radius[k]);
+  }
+  in_ellipsoid_axes(e, end, step, 0.0, p);
+  const double gone = length_of(way), away = length_of(p);
+  if (away > widest + double(reach) + gone) return false;  // turning alone brings nothing nearer
+  const bool inside = ellipsoid_level(radius, p) < 1;
+  surface_of_ellipsoid(e, radius, p, found);
+  double above = 0;  // signed distance
+  for (int k = 0; k < 3; ++k) above += (end[k] - double(found.point[k])) * double(found.normal[k]);
+  const double swept = gone + 2 * length_of(turn) * (away + gone);
+  const double skin = max(-kDeeper * double(reach), kSkin * shortest);
+  const bool suspect = swept > (inside ? -above - skin : above);
+  if (suspect && slide_on_ellipsoid(e, radius, start, end, step, skin, slid)) {
+    MeshSurfacePoint<T> entry;
+    surface_of_ellipsoid(e, radius, slid, entry);
+    // The near side, unless it is what is nearest anyway.
+    double same = 0;
+    for (int k = 0; k < 3; ++k) same += double(entry.normal[k]) * double(found.normal[k]);
+    if (!inside || same < 0) found = entry;
+    return true;
+  }
+  return above < double(reach);
 }
 
 // Velocity after an inelastic contact with Coulomb friction: no approach is left along the normal, and the

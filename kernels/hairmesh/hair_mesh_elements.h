@@ -116,6 +116,13 @@ struct BlockPattern {
 };
 
 // Everything that a solver copies when it is made. Vertices are numbered as by HairMeshTopology.
+// A place of the outer surface between vertices: the middle of an edge or a face.
+template <class T>
+struct MeshSample {
+  std::int32_t vertex[4];  // that it is the mean of; -1: fewer
+  T slack;  // how far it may be in a solid that its vertices are out of, as chords of what is round are [m]
+};
+
 template <class T>
 struct HairMeshView {
   std::int32_t columns, layers;
@@ -131,6 +138,7 @@ struct HairMeshView {
   const std::int32_t* first_neighbour;  // [columns + 1]
   const std::int32_t* neighbour;        // later columns that these edges lead to
   MeshArray<std::int32_t> external;     // vertices that collide
+  MeshArray<MeshSample<T>> samples;     // so do these
   MeshArray<std::int32_t> surface;      // outer faces, four vertices each, the last -1 for a triangle
   T damping, drag, tolerance;
   T reach;  // a vertex this near a surface that held it is still in contact with it [m]

@@ -49,6 +49,7 @@ class HairMeshModel {
     place_blocks();
     join_neighbours();
     external_ = mesh_.external_vertices();
+    add_samples();
     for (const SurfaceFace& face : mesh_.surface_faces())
       surface_.insert(surface_.end(), std::begin(face.vertex), std::end(face.vertex));
     for (const double x : rest_) rounded_rest_.push_back(static_cast<T>(x));
@@ -69,6 +70,7 @@ class HairMeshModel {
             first_neighbour_.data(),
             neighbour_.data(),
             array(external_),
+            array(samples_),
             {surface_.data(), static_cast<std::int32_t>(surface_.size() / 4)},
             static_cast<T>(parameters_.damping),
             static_cast<T>(parameters_.drag),
@@ -256,7 +258,12 @@ class HairMeshModel {
       bend.before[i] = static_cast<T>(first[from]), bend.beside[i] = static_cast<T>(second[from]);
     }
     bend.turn = static_cast<T>(turn);
-    bend.stiffness = static_cast<T>(stiffness / (pp * dot(q, q)));
+    // C is the angle times |q|; over their mean length it is the curvature, of edges however unlike. As the
+    // frame of p and t degenerates, its coefficients grow as the sine of their angle falls; an edge under a
+    // quarter of the other tells as little of a direction.
+    const double qq = dot(q, q), mean = (std::sqrt(pp) + std::sqrt(qq)) / 2, sine2 = square / (pp * tt),
+                 unlike = std::min(1.0, 16 * std::min(pp, qq) / std::max(pp, qq));
+    bend.stiffness = static_cast<T>(unlike * sine2 * stiffness / (qq * mean * mean));
     bends_.push_back(bend);
   }
 
@@ -276,6 +283,36 @@ class HairMeshModel {
       volume.stiffness = static_cast<T>(parameters_.volume * prism / (2 * corners));
       volumes_.push_back(volume);
     }
+  }
+
+  // Of outer faces and their edges, where no root is part of them: those lie on the scalp.
+  void add_samples() {
+    std::vector<std::pair<std::int32_t, std::int32_t>> edges;
+    for (const SurfaceFace& face : mesh_.surface_faces()) {
+      const int corners = face.vertex[3] < 0 ? 3 : 4;
+      bool rooted = false;
+      for (int k = 0; k < corners; ++k) {
+        const auto [a, b] = std::minmax(face.vertex[k], face.vertex[(k + 1) % corners]);
+        if (mesh_.layer_of(a) > 0 && mesh_.layer_of(b) > 0) edges.emplace_back(a, b);
+        rooted = rooted || mesh_.layer_of(face.vertex[k]) == 0;
+      }
+      if (!rooted) add_sample({face.vertex[0], face.vertex[1], face.vertex[2], face.vertex[3]});
+    }
+    std::sort(edges.begin(), edges.end());
+    edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+    for (const auto& [a, b] : edges) add_sample({a, b, -1, -1});
+  }
+  void add_sample(const std::array<std::int32_t, 4>& vertices) {
+    MeshSample<T> sample{};
+    double longest = 0;
+    std::copy(vertices.begin(), vertices.end(), sample.vertex);
+    for (const std::int32_t v : vertices)
+      if (v >= 0) {
+        const RestPoint across = at(v) - at(vertices[0]);
+        longest = std::max(longest, std::sqrt(dot(across, across)));
+      }
+    sample.slack = static_cast<T>(0.15 * longest);
+    samples_.push_back(sample);
   }
 
   template <class E>
@@ -325,6 +362,7 @@ class HairMeshModel {
   std::vector<MeshSheet<T>> sheets_;
   std::vector<MeshBend<T>> bends_;
   std::vector<MeshVolume<T>> volumes_;
+  std::vector<MeshSample<T>> samples_;
   PatternBuilder pattern_;
   std::vector<std::int32_t> degree_, first_neighbour_, neighbour_, external_, surface_;
 };

@@ -10,25 +10,29 @@ namespace ringlet::kernels {
 // The place of a solid's surface that a vertex is told of.
 template <class T>
 struct MeshSurfacePoint {
-  T point[3];     // on the surface, nearest the vertex [m]
+  T point[3];     // on the surface, where the vertex has to be [m]
   T normal[3];    // out of the solid, of length 1
   T velocity[3];  // of the surface there [m/s]
   T friction;     // Coulomb mu [-]
 };
 
-// What hair mesh vertices collide with. `find` says whether the point lies deeper than `reach` above the
-// surface: with reach 0, whether it is inside; it then fills `found`. Called for one vertex after another.
+// What hair mesh vertices collide with. `find` says whether a vertex that the step has brought from `before`
+// to `point` lies deeper than `reach` above the surface (0: inside; negative: so deep inside), or has gone
+// through the solid; it then fills `found`, with what is nearest the point, or nearest where the vertex
+// slides to from where it entered. Called for one vertex after another.
 template <class T>
 struct MeshSurface {
   const void* context;
-  bool (*find)(const void* context, const T* point, T reach, MeshSurfacePoint<T>& found);
+  bool (*find)(const void* context, const T* before, const T* point, T reach, MeshSurfacePoint<T>& found);
 };
 
-// Any callable bool(const T* point, T reach, MeshSurfacePoint<T>& found), which has to outlive the surface.
+// Any callable bool(const T* before, const T* point, T reach, MeshSurfacePoint<T>& found), which has to
+// outlive the surface.
 template <class T, class Find>
 MeshSurface<T> mesh_surface(const Find& find) {
-  return {&find, [](const void* context, const T* point, T reach, MeshSurfacePoint<T>& found) {
-            return (*static_cast<const Find*>(context))(point, reach, found);
+  return {&find,
+          [](const void* context, const T* before, const T* point, T reach, MeshSurfacePoint<T>& found) {
+            return (*static_cast<const Find*>(context))(before, point, reach, found);
           }};
 }
 
@@ -40,6 +44,7 @@ struct MeshEllipsoid {
   T radius[3];    // along them [m]
   T velocity[3];  // of the centre [m/s]
   T spin[3];      // angular velocity [rad/s]
+  T turn[3];      // by the step, as the vector part of a unit quaternion, its real part not negative
   T friction;     // Coulomb mu [-]
 };
 
@@ -48,6 +53,7 @@ struct MeshEllipsoid {
 template <class T>
 struct MeshContact {
   std::int32_t vertex;
+  std::int32_t solid;   // whose, by the order in which `collide` is told of them
   std::int32_t sticks;  // 1: friction holds it
   T normal[3];
   T velocity[3];  // of the surface there [m/s]
@@ -66,6 +72,7 @@ struct HairMeshStep {
   const T* air;   // [vertices][3] the air's velocity [m/s]; null: still air
 };
 
+// Since the last `solve`.
 struct MeshContactFigures {
   std::int32_t touched = 0;    // vertices in contact with a solid
   std::int32_t corrected = 0;  // those moved out of one
@@ -92,8 +99,9 @@ class HairMeshSolver {
   // Solves the system and moves the mesh: roots to where they are taken, vertices in contact as their surface
   // does along its normal.
   virtual SolveFigures solve() = 0;
-  // Moves external vertices out of a solid and answers their velocities; they are in contact until the next
-  // `solve`.
+  // Moves external vertices out of a solid, or back to where they entered one that they went through, and
+  // answers their velocities; moves outer faces and edges that are cut by it as a whole; they are in contact
+  // until the next `solve`. Solids are told of in the same order in every step.
   virtual MeshContactFigures collide(const MeshSurface<T>& surface) = 0;
   virtual MeshContactFigures collide(const MeshEllipsoid<T>* ellipsoids, std::int32_t count) = 0;
   // Takes the rest of the mesh along with what was corrected since the last `solve`.

@@ -44,6 +44,7 @@ class MeshStepper final : public HairMeshSolver<T> {
         bends_(mesh.bends),
         volumes_(mesh.volumes),
         external_(mesh.external),
+        samples_(mesh.samples),
         surface_({mesh.surface.data, 4 * mesh.surface.count}),
         matrix_(mesh.pattern),
         laplacian_(columns_, layers_, mesh.pattern.first_layer, mesh.degree, mesh.first_neighbour,
@@ -53,8 +54,8 @@ class MeshStepper final : public HairMeshSolver<T> {
     const auto count = static_cast<std::size_t>(vertices_);
     copy_values(mass_, mesh.mass, count);
     zero_values(4 * (count + kBeyond), position_, velocity_, impulse_, change_, displacement_, rubbing_,
-                carried_);
-    zero_values(count, held_);
+                carried_, before_);
+    zero_values(count, held_), zero_values(count, holder_);
     zero_values(count, contact_of_);
     roots_.resize(4 * static_cast<std::size_t>(columns_));
     contacts_.resize(count), corrected_.resize(count);
@@ -64,7 +65,8 @@ class MeshStepper final : public HairMeshSolver<T> {
   void set_state(const T* x, const T* v) override {
     for (std::int32_t i = 0; i < vertices_; ++i)
       position()[i] = padded(x + 3 * i), velocity()[i] = padded(v + 3 * i);
-    forget_contacts(), release_all(), corrected_count_ = 0;
+    for (std::int32_t i = 0; i < vertices_; ++i) vectors(before_)[i] = position()[i];
+    forget_contacts(), release_all(), forget_corrections();
   }
   void get_state(T* x, T* v) const override {
     for (std::int32_t i = 0; i < vertices_; ++i)
@@ -109,27 +111,29 @@ class MeshStepper final : public HairMeshSolver<T> {
     for (std::int32_t i = 0; i < vertices_; ++i) velocity()[i] += vectors(change_)[i];
     release_all();
     for (std::int32_t k = 0; k < contact_count_; ++k) rub(contacts_.data()[k], vectors(carried_)[k]);
-    for (std::int32_t i = 0; i < vertices_; ++i) position()[i] += step_ * velocity()[i];
+    for (std::int32_t i = 0; i < vertices_; ++i) {
+      vectors(before_)[i] = position()[i];
+      position()[i] += step_ * velocity()[i];
+    }
     if (held_roots_)  // to the last bit
       for (std::int32_t c = 0; c < columns_; ++c) position()[c * layers_] = vectors(roots_)[c];
-    forget_contacts(), corrected_count_ = 0;
+    forget_contacts(), forget_corrections();
+    solids_met_ = 0, depth_ = 0;
     return figures;
   }
 
   MeshContactFigures collide(const MeshSurface<T>& surface) override {
-    return collide_with([&](const T* point, T reach, MeshSurfacePoint<T>& found) {
-      return surface.find(surface.context, point, reach, found);
+    collide_with([&](const T* before, const T* point, T reach, MeshSurfacePoint<T>& found) {
+      return surface.find(surface.context, before, point, reach, found);
     });
+    return contact_figures();
   }
   MeshContactFigures collide(const MeshEllipsoid<T>* ellipsoids, std::int32_t count) override {
-    MeshContactFigures all;
-    for (std::int32_t k = 0; k < count; ++k) {
-      const MeshContactFigures one = collide_with([&](const T* point, T reach, MeshSurfacePoint<T>& found) {
-        return find_on_ellipsoid(ellipsoids[k], point, reach, found);
+    for (std::int32_t k = 0; k < count; ++k)
+      collide_with([&](const T* before, const T* point, T reach, MeshSurfacePoint<T>& found) {
+        return find_on_ellipsoid(ellipsoids[k], before, point, reach, static_cast<double>(step_), found);
       });
-      all.touched += one.touched, all.corrected += one.corrected, all.depth = max(all.depth, one.depth);
-    }
-    return all;
+    return contact_figures();
   }
 
   SolveFigures minimise() override {
@@ -145,12 +149,11 @@ class MeshStepper final : public HairMeshSolver<T> {
     gradients_.multiply(laplacian_, u, left);
     for (std::int32_t i = 0; i < vertices_; ++i) left[i] = -left[i];
     const SolveFigures figures = gradients_.solve(laplacian_, filter_, tolerance_, iterations_, left, w);
-    for (std::int32_t k = 0; k < corrected_count_; ++k) u[corrected_.data()[k]] = Padded<T>{};
     const T per_step = T(1) / step_;
     for (std::int32_t i = 0; i < vertices_; ++i) {
       position()[i] += w[i], velocity()[i] += per_step * w[i];
     }
-    corrected_count_ = 0;
+    forget_corrections();
     return figures;
   }
 
@@ -194,9 +197,9 @@ class MeshStepper final : public HairMeshSolver<T> {
   std::size_t bytes() const override {
     const std::size_t total = matrix_.bytes() + laplacian_.bytes() + gradients_.bytes() + springs_.bytes() +
                               sheets_.bytes() + bends_.bytes() + volumes_.bytes() + external_.bytes() +
-                              surface_.bytes();
-    return total + mass_.bytes() + 7 * position_.bytes() + roots_.bytes() + filter_.bytes() +
-           corrected_.bytes() + held_.bytes() + contact_of_.bytes() + contacts_.bytes();
+                              samples_.bytes() + surface_.bytes();
+    return total + mass_.bytes() + 8 * position_.bytes() + roots_.bytes() + filter_.bytes() +
+           corrected_.bytes() + held_.bytes() + holder_.bytes() + contact_of_.bytes() + contacts_.bytes();
   }
 
   const BlockMatrix<T>& matrix() const { return matrix_; }
@@ -252,7 +255,7 @@ class MeshStepper final : public HairMeshSolver<T> {
     const Padded<T> n = padded(contact.normal),
                     held = carried + (gradients_.product()[i] - vectors(impulse_)[i]);
     const T push = dot_product(n, held);
-    held_.data()[i] = kReleased;
+    held_.data()[i] = kReleased, holder_.data()[i] = contact.solid;
     if (!(push > T(0))) return;
     Padded<T> direction;  // of friction
     if (contact.sticks) {
@@ -272,30 +275,58 @@ class MeshStepper final : public HairMeshSolver<T> {
   }
   static RINGLET_KERNEL T square(Padded<T> a) { return dot_product(a, a); }
 
+  // A surface holds what it held, as far as it reaches.
   template <class Find>
-  MeshContactFigures collide_with(const Find& find) {
-    MeshContactFigures figures;
+  void collide_with(const Find& find) {
+    const std::int32_t solid = solids_met_++;
     for (const std::int32_t i : external_) {
       MeshSurfacePoint<T> found;
-      T point[3];
-      store_three(point, position()[i]);
-      const bool held = held_.data()[i] == kSlides || held_.data()[i] == kSticks;
-      if (!find(point, held ? reach_ : T(0), found)) continue;
+      T before[3], point[3];
+      store_three(before, vectors(before_)[i]), store_three(point, position()[i]);
+      const bool held =
+          (held_.data()[i] == kSlides || held_.data()[i] == kSticks) && holder_.data()[i] == solid;
+      if (!find(before, point, held ? reach_ : T(0), found)) continue;
       const Padded<T> n = padded(found.normal), out = padded(found.point) - position()[i];
       const T depth = dot_product(n, out);
-      ++figures.touched;
       if (depth > T(0)) {
-        ++figures.corrected, figures.depth = max(figures.depth, static_cast<double>(depth));
+        depth_ = max(depth_, static_cast<double>(depth));
         correct(i, out);
+      } else if (contact_of_.data()[i] != 0) {
+        continue;  // another has pushed it in this step
       }
       // One that was let go comes anew only where it moves into the surface: rounding may leave it inside.
       if (held_.data()[i] == kReleased && !(dot_product(velocity()[i] - padded(found.velocity), n) < T(0)))
         continue;
       velocity()[i] = velocity_after_contact<T>(velocity()[i], padded(found.velocity), n, found.friction);
-      hold(i, found);
+      hold(i, solid, found);
     }
-    return figures;
+    for (const MeshSample<T>& sample : samples_) collide_between(find, sample);
   }
+  // A sample that is deeper than its slack takes its vertices along, without approach from then on.
+  template <class Find>
+  void collide_between(const Find& find, const MeshSample<T>& sample) {
+    Padded<T> from{}, at{}, rate{};
+    std::int32_t count = 0;
+    while (count < 4 && sample.vertex[count] >= 0) {
+      const std::int32_t i = sample.vertex[count++];
+      from += vectors(before_)[i], at += position()[i], rate += velocity()[i];
+    }
+    const T share = T(1) / static_cast<T>(count);
+    MeshSurfacePoint<T> found;
+    T before[3], point[3];
+    store_three(before, share * from), store_three(point, share * at);
+    if (!find(before, point, -sample.slack, found)) return;
+    const Padded<T> n = padded(found.normal), out = padded(found.point) - sample.slack * n - padded(point);
+    const T depth = dot_product(n, out);
+    if (!(depth > T(0))) return;
+    depth_ = max(depth_, static_cast<double>(depth));
+    const T approach = min(dot_product(n, share * rate - padded(found.velocity)), T(0));
+    for (std::int32_t k = 0; k < count; ++k) {
+      correct(sample.vertex[k], out);
+      velocity()[sample.vertex[k]] -= approach * n;
+    }
+  }
+  MeshContactFigures contact_figures() const { return {contact_count_, corrected_count_, depth_}; }
 
   void correct(std::int32_t i, Padded<T> out) {
     Padded<T>& u = vectors(displacement_)[i];
@@ -303,14 +334,20 @@ class MeshStepper final : public HairMeshSolver<T> {
     if (first) corrected_.data()[corrected_count_++] = i;
     position()[i] += out, u += out;
   }
+  void forget_corrections() {
+    for (std::int32_t k = 0; k < corrected_count_; ++k)
+      vectors(displacement_)[corrected_.data()[k]] = Padded<T>{};
+    corrected_count_ = 0;
+  }
 
   // The last surface that a vertex meets holds it.
-  void hold(std::int32_t i, const MeshSurfacePoint<T>& found) {
-    MeshContact<T> contact{i, held_.data()[i] == kSticks, {}, {}, {}, found.friction};
+  void hold(std::int32_t i, std::int32_t solid, const MeshSurfacePoint<T>& found) {
+    const bool known = holder_.data()[i] == solid, slides = known && held_.data()[i] == kSlides,
+               sticks = known && held_.data()[i] == kSticks;
+    MeshContact<T> contact{i, solid, sticks, {}, {}, {}, found.friction};
     for (int c = 0; c < 3; ++c) contact.normal[c] = found.normal[c], contact.velocity[c] = found.velocity[c];
-    if (held_.data()[i] == kSlides) store_three(contact.force, vectors(rubbing_)[i]);
-    // Friction stopped one that has come anew.
-    if (held_.data()[i] != kSlides && held_.data()[i] != kSticks)
+    if (slides) store_three(contact.force, vectors(rubbing_)[i]);
+    if (!slides && !sticks)  // whether friction stopped it
       contact.sticks = found.friction > T(0) && square(velocity()[i] - padded(found.velocity)) == T(0);
     keep(contact);
   }
@@ -335,19 +372,23 @@ class MeshStepper final : public HairMeshSolver<T> {
   MeshElements<MeshSheet<T>> sheets_;
   MeshElements<MeshBend<T>> bends_;
   MeshElements<MeshVolume<T>> volumes_;
-  MeshElements<std::int32_t> external_, surface_;
+  MeshElements<std::int32_t> external_;
+  MeshElements<MeshSample<T>> samples_;
+  MeshElements<std::int32_t> surface_;
   BlockMatrix<T> matrix_;
   MeshLaplacian<T> laplacian_;
   VertexFilter<T> filter_;
   FilteredConjugateGradients<T> gradients_;
-  HostBuffer<T> mass_, position_, velocity_, impulse_, change_, displacement_, roots_;
+  HostBuffer<T> mass_, position_, velocity_, impulse_, change_, displacement_, before_, roots_;
   HostBuffer<std::int32_t> corrected_;   // since the last solve
   HostBuffer<std::int32_t> contact_of_;  // [vertices] place in contacts_ plus 1; 0: none
   HostBuffer<char> held_;                // how a surface that pushed it held a vertex in the last solve
+  HostBuffer<std::int32_t> holder_;      // which
   HostBuffer<MeshContact<T>> contacts_;
   HostBuffer<T> carried_;  // impulses that gave contacts their surface's velocity [N s]
   HostBuffer<T> rubbing_;  // [vertices] friction on those that slide [N]
-  std::int32_t contact_count_ = 0, corrected_count_ = 0;
+  std::int32_t contact_count_ = 0, corrected_count_ = 0, solids_met_ = 0;
+  double depth_ = 0;  // of the deepest correction since the last solve [m]
 };
 
 }  // namespace RINGLET_ISA

@@ -35,18 +35,20 @@ struct StrandContact {
   T voxel, band;  // [m]
   Patch skin;     // that the strand grows on
 
-  RINGLET_FUNCTION StrandContact(const SolidView& s, const double* root_point, T h)
+  RINGLET_FUNCTION StrandContact(const SolidView& s, const Vector3<double>& root_point, T h)
       : solid(s),
         root(local(s.rotation, s.translation, root_point)),
         root_before(local(s.rotation_before, s.translation_before, root_point)),
         step(h),
         voxel(static_cast<T>(s.level_set[0].voxel_size)),
         band(static_cast<T>(s.level_set[0].background)) {}
+  // The root point of one lane of a batch.
+  RINGLET_FUNCTION StrandContact(const SolidView& s, const double* root_point, T h)
+      : StrandContact(s, Vector3<double>{root_point[0], root_point[kLanes], root_point[2 * kLanes]}, h) {}
 
   RINGLET_FUNCTION static Vector3<T> local(const double* rotation, const double* translation,
-                                           const double* root_point) {
-    const double away[3] = {root_point[0] - translation[0], root_point[kLanes] - translation[1],
-                            root_point[2 * kLanes] - translation[2]};
+                                           const Vector3<double>& point) {
+    const double away[3] = {point.x - translation[0], point.y - translation[1], point.z - translation[2]};
     const auto along = [&](int axis) {
       return static_cast<T>(rotation[axis] * away[0] + rotation[3 + axis] * away[1] +
                             rotation[6 + axis] * away[2]);

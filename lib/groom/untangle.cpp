@@ -9,6 +9,7 @@ namespace {
 
 constexpr double kSmoothing = 0.3;                // of displacements, from sweep to sweep
 constexpr int kSweeps = 100, kSmoothSweeps = 60;  // of a round, and with smoothing
+constexpr double kShrink = 0.25;                  // what edges may shrink to from the scalp outward
 constexpr double kDamping = 0.02;                 // of a vertex's step, relative to the trace of its system
 
 // A corner tetrahedron: det(a - o, b - o, top - bottom), where o is one of bottom and top.
@@ -55,7 +56,10 @@ std::vector<Corner> corners_of(const HairMesh& mesh) {
   }
   for (Corner& corner : corners) {
     const auto& x = mesh.positions;
-    corner.scale = (x[corner.a] - x[corner.origin]).norm() * (x[corner.b] - x[corner.origin]).norm() *
+    const auto length = [&](std::size_t from, std::size_t to) {
+      return std::max((x[to] - x[from]).norm(), kShrink * (x[to % n] - x[from % n]).norm());
+    };
+    corner.scale = length(corner.origin, corner.a) * length(corner.origin, corner.b) *
                    (x[corner.top] - x[corner.bottom]).norm();
   }
   return corners;

@@ -1,32 +1,57 @@
 #include "hairmesh/collider.h"
 
-#include "kernels/solid/surface.h"
+#include <algorithm>
+#include <cmath>
 
 namespace ringlet::hairmesh {
 namespace {
 
-using kernels::Vector3;
+constexpr double kDeeper = 1.5;  // than may be: rounding, and what the last step left
 
-Vec3 eigen(const Vector3<double>& v) { return {v.x, v.y, v.z}; }
+using kernels::SurfaceSample;
+using kernels::Vector3;
 
 }  // namespace
 
 template <class T>
-bool SolidCollider<T>::operator()(const T* point, T reach, kernels::MeshSurfacePoint<T>& found) const {
-  const Vec3 x = origin_ + Vec3(point[0], point[1], point[2]);
-  const Vec3 away = x - Vec3(solid_.translation[0], solid_.translation[1], solid_.translation[2]);
-  const Vector3<double> local =
-      kernels::rotate_back(solid_.rotation, Vector3<double>{away.x(), away.y(), away.z()});
-  const kernels::SurfaceSample<double> at = kernels::sample_surface(solid_, local, kernels::Patch{});
-  if (!at.exact || !(at.distance < static_cast<double>(reach))) return false;
-  const Vec3 normal = eigen(kernels::rotate(solid_.rotation, at.normal)),
-             on_surface = x - at.distance * normal - origin_,
-             velocity = eigen(kernels::surface_displacement(solid_, at)) / step_;
-  for (int c = 0; c < 3; ++c) {
-    found.point[c] = static_cast<T>(on_surface[c]), found.normal[c] = static_cast<T>(normal[c]);
-    found.velocity[c] = static_cast<T>(velocity[c]);
+bool SolidCollider<T>::operator()(const T* before, const T* point, T reach,
+                                  kernels::MeshSurfacePoint<T>& found) const {
+  const Vector3<double> x{point[0], point[1], point[2]}, start{before[0], before[1], before[2]},
+      velocity = (1 / step_) * (x - start);
+  SurfaceSample<double> at = contact_.sample(x);
+  kernels::LaneFigures<double> figures;
+  const kernels::Entry<double> entry = kernels::hidden_entry(contact_, x, velocity, at, figures);
+  Vector3<double> to = x, entered = entry.x;
+  bool through = entry.found;
+  if (!through && reach < T(0) && at.exact && at.distance < 0) {
+    // It may have been a little inside before, and is nearer to the far side now.
+    const Vector3<double> p = contact_.local(x), from = p - contact_.way(x, velocity, p, at.triangle);
+    const SurfaceSample<double> was = kernels::sample_surface(contact_.solid, from, contact_.skin);
+    through = was.exact && was.distance < 0 && was.distance >= kDeeper * static_cast<double>(reach) &&
+              dot(was.normal, at.normal) < 0;
+    entered = contact_.world(from - was.distance * was.normal);
   }
-  found.friction = static_cast<T>(solid_.friction);
+  if (through) {
+    at = contact_.sample(entered);
+    if (!at.exact) return false;
+    // On from the entry without what would lead it farther in, unless that is inside again.
+    const Vector3<double> normal = contact_.world_normal(at);
+    to = x - std::min(dot(x - entered, normal), 0.0) * normal;
+    const SurfaceSample<double> beside = contact_.sample(to);
+    if (beside.exact && beside.distance < 0)
+      at = beside;
+    else
+      at.distance = 0;
+  } else if (!at.exact || !(at.distance < static_cast<double>(reach))) {
+    return false;
+  }
+  const Vector3<double> normal = contact_.world_normal(at), on_surface = to - at.distance * normal,
+                        surface_velocity = (1 / step_) * kernels::surface_displacement(contact_.solid, at);
+  const auto fill = [](T(&values)[3], const Vector3<double>& v) {
+    values[0] = static_cast<T>(v.x), values[1] = static_cast<T>(v.y), values[2] = static_cast<T>(v.z);
+  };
+  fill(found.point, on_surface), fill(found.normal, normal), fill(found.velocity, surface_velocity);
+  found.friction = static_cast<T>(contact_.solid.friction);
   return true;
 }
 
@@ -37,12 +62,14 @@ kernels::MeshEllipsoid<T> moving_ellipsoid(const scene::Ellipsoid& rest, const P
              centre_before = before.rotation * rest.centre + before.position;
   const Mat3 axes = now.rotation * rest.rotation.toRotationMatrix();
   const Eigen::AngleAxisd turn(Mat3(now.rotation * before.rotation.transpose()));
-  const Vec3 velocity = (centre - centre_before) / step, spin = turn.angle() / step * turn.axis();
+  const Vec3 velocity = (centre - centre_before) / step, spin = turn.angle() / step * turn.axis(),
+             half = std::sin(turn.angle() / 2) * turn.axis();  // Eigen's angles are not over pi
   kernels::MeshEllipsoid<T> ellipsoid{};
   for (int c = 0; c < 3; ++c) {
     ellipsoid.centre[c] = static_cast<T>(centre[c] - origin[c]);
     ellipsoid.radius[c] = static_cast<T>(rest.radii[c]);
     ellipsoid.velocity[c] = static_cast<T>(velocity[c]), ellipsoid.spin[c] = static_cast<T>(spin[c]);
+    ellipsoid.turn[c] = static_cast<T>(half[c]);
     for (int k = 0; k < 3; ++k) ellipsoid.axis[k][c] = static_cast<T>(axes(c, k));
   }
   ellipsoid.friction = static_cast<T>(rest.friction);

@@ -4,7 +4,7 @@
 
 #include "core/geometry.h"
 #include "kernels/hairmesh/hair_mesh_solver.h"
-#include "kernels/solid/solid_view.h"
+#include "kernels/solid/contact.h"
 #include "scene/scene_desc.h"
 
 namespace ringlet::hairmesh {
@@ -15,14 +15,13 @@ template <class T>
 class SolidCollider {
  public:
   SolidCollider(const kernels::SolidView& solid, const Vec3& origin, double step)
-      : solid_(solid), origin_(origin), step_(step) {}
+      : contact_(solid, kernels::Vector3<double>{origin.x(), origin.y(), origin.z()}, step), step_(step) {}
 
   // As kernels::MeshSurface::find.
-  bool operator()(const T* point, T reach, kernels::MeshSurfacePoint<T>& found) const;
+  bool operator()(const T* before, const T* point, T reach, kernels::MeshSurfacePoint<T>& found) const;
 
  private:
-  const kernels::SolidView& solid_;
-  Vec3 origin_;
+  kernels::StrandContact<double> contact_;  // as of a particle of a strand that is rooted at the origin
   double step_;
 };
 

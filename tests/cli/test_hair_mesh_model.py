@@ -105,6 +105,25 @@ def test_ellipsoids_keep_hair_out_and_minimisation_is_left_out_when_not_asked_fo
     assert "minimisation" not in stages(program, scene, *options, off)
 
 
+BALL = """v 0.06 0 0\nv -0.06 0 0\nv 0 0.06 0\nv 0 -0.06 0\nv 0 0 0.06\nv 0 0 -0.06
+f 1 3 5\nf 3 2 5\nf 2 4 5\nf 4 1 5\nf 3 1 6\nf 2 3 6\nf 4 2 6\nf 1 4 6\n"""
+
+
+@pytest.mark.parametrize("minimise", ["true", "false"])
+def test_a_level_set_that_flies_through_within_a_frame_takes_the_hair_along(program, scene, tmp_path, minimise):
+    """The solid's way from frame 2 to 3 leads from one side of the hair to the other."""
+    (tmp_path / "ball.obj").write_text(BALL)
+    level = RADIUS + 0.07
+    keys = [{"frame": frame, "translate": [x, level, 0.0]} for frame, x in ((2, -0.3), (3, 0.25))]
+    ball = {"source": str(tmp_path / "ball.obj"), "friction": 0.0, "animation": {"keys": keys}}
+    still = ["--set=/head/animation=null", "--set=/effects/gravity=null", "--set=/frames/last=3"]
+    options = [*still, f"--set=/effects/solids=[{json.dumps(ball)}]"]
+    steps(program, scene, tmp_path / "out", *options, f"--set=/model/hair_mesh/deformation_minimisation={minimise}")
+    before, after = (positions(tmp_path / "out", frame) for frame in (2, 3))
+    met = (np.abs(before[:, 1] - level) < 0.01) & (np.abs(before[:, 2]) < 0.01)
+    assert met.any() and (after[met, 0] - before[met, 0]).mean() > 0.03
+
+
 def test_the_plan_has_what_the_scene_calls_for(program, scene):
     assert set(stages(program, scene, "--set=/effects/solids=[]")) == {"roots", "forces", "solve", "strands"}
     windy = stages(program, scene, '--set=/effects/wind={"velocity": [1, 0, 0]}')

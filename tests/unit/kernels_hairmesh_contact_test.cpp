@@ -40,7 +40,7 @@ TEST(HairMeshEllipsoid, NearestPointIsOnItAlongItsNormalAndNearest) {
       if (n == 100) inside.setZero();
       const Vec3 local = radius.cwiseProduct(inside), point = vec(e.centre) + axes * local;
       MeshSurfacePoint<double> found{};
-      ASSERT_TRUE(kernels::find_on_ellipsoid(e, point.data(), 0.0, found));
+      ASSERT_TRUE(kernels::find_on_ellipsoid(e, point.data(), point.data(), 0.0, 1.0, found));
       const Vec3 on = axes.transpose() * (vec(found.point) - vec(e.centre)), unit = on.cwiseQuotient(radius);
       EXPECT_NEAR(unit.norm(), 1, 1e-12);
       const Vec3 normal = axes.transpose() * vec(found.normal);
@@ -57,8 +57,8 @@ TEST(HairMeshEllipsoid, NearestPointIsOnItAlongItsNormalAndNearest) {
     }
     MeshSurfacePoint<double> found{};
     const Vec3 outside = vec(e.centre) + axes * Vec3(0, 0, radius[2] + 1e-3);
-    EXPECT_FALSE(kernels::find_on_ellipsoid(e, outside.data(), 0.0, found));
-    EXPECT_TRUE(kernels::find_on_ellipsoid(e, outside.data(), 2e-3, found));
+    EXPECT_FALSE(kernels::find_on_ellipsoid(e, outside.data(), outside.data(), 0.0, 1.0, found));
+    EXPECT_TRUE(kernels::find_on_ellipsoid(e, outside.data(), outside.data(), 2e-3, 1.0, found));
     EXPECT_NEAR((vec(found.point) - outside).norm(), 1e-3, 1e-12);
   }
 }
@@ -68,8 +68,71 @@ TEST(HairMeshEllipsoid, ItsSurfaceMovesAsARigidBodyDoes) {
   e.velocity[0] = 2, e.spin[1] = 3;
   MeshSurfacePoint<double> found{};
   const Vec3 point(0, 1, 0.05);
-  ASSERT_TRUE(kernels::find_on_ellipsoid(e, point.data(), 0.0, found));
+  ASSERT_TRUE(kernels::find_on_ellipsoid(e, point.data(), point.data(), 0.0, 1.0, found));
   EXPECT_LE((vec(found.velocity) - Vec3(2 + 3 * 0.1, 0, 0)).norm(), 1e-14);
+}
+
+// Where an ellipsoid tells a vertex to be that a step of `step` [s] has brought from `before` to `point`.
+MeshSurfacePoint<double> swept(const MeshEllipsoid<double>& e, const Vec3& before, const Vec3& point,
+                               double step) {
+  MeshSurfacePoint<double> found{};
+  EXPECT_TRUE(kernels::find_on_ellipsoid(e, before.data(), point.data(), 0.0, step, found));
+  return found;
+}
+
+TEST(HairMeshEllipsoid, StopsOnTheNearSideWhatWouldGoThrough) {
+  const double step = 1 / 24.0;
+  MeshEllipsoid<double> e = ellipsoid({0, 0, 0}, {0.1, 0.2, 0.1}, Eigen::Matrix3d::Identity());
+  const Vec3 before(-0.5, 0.005, 0.002), point(0.4, 0.005, 0.002);
+  const MeshSurfacePoint<double> still = swept(e, before, point, step);
+  const Vec3 on_unit_ball = vec(still.point).cwiseQuotient(Vec3(0.1, 0.2, 0.1));
+  EXPECT_NEAR(on_unit_ball.norm(), 1, 1e-12);
+  EXPECT_LT(still.point[0], -0.05);
+  EXPECT_LT(still.normal[0], -0.9);
+  // What counts is the way against the ellipsoid.
+  e.velocity[0] = -0.9 / step, e.centre[0] = -0.9;
+  const Vec3 aside(-0.9, 0, 0);
+  const MeshSurfacePoint<double> moving = swept(e, before, before, step);
+  EXPECT_LE((vec(moving.point) - vec(still.point) - aside).norm(), 1e-12);
+  // One that is inside, past the middle, belongs to the side it came from; one that only touches does not
+  // slide.
+  e.velocity[0] = 0, e.centre[0] = 0;
+  EXPECT_LT(swept(e, before, {0.05, 0.005, 0.002}, step).normal[0], -0.9);
+  const Vec3 under(-0.09, 0.005, 0.002);
+  EXPECT_LE((vec(swept(e, before, under, step).point) - vec(swept(e, under, under, step).point)).norm(),
+            1e-12);
+  const Vec3 past(0.4, 0.3, 0.01), over(-0.5, 0.3, 0.01);
+  MeshSurfacePoint<double> none{};
+  EXPECT_FALSE(kernels::find_on_ellipsoid(e, over.data(), past.data(), 0.0, step, none));
+}
+
+// A long blade turns by a right angle: it takes along what it sweeps over, on the side that leads.
+TEST(HairMeshEllipsoid, SweepsWhatItTurnsThrough) {
+  const double step = 1 / 24.0;
+  Eigen::Matrix3d axes;  // its long axis points along y at the end, along x at the start
+  axes.col(0) = Vec3(0, 1, 0), axes.col(1) = Vec3(-1, 0, 0), axes.col(2) = Vec3(0, 0, 1);
+  MeshEllipsoid<double> blade = ellipsoid({0, 0, 0}, {0.4, 0.03, 0.03}, axes);
+  blade.spin[2] = 0.5 * M_PI / step, blade.turn[2] = std::sin(0.25 * M_PI);
+  const Vec3 still(0.15, 0.15, 0);
+  const MeshSurfacePoint<double> found = swept(blade, still, still, step);
+  EXPECT_LT(found.normal[0], -0.9);
+  EXPECT_LT(found.point[0], 0);
+  MeshSurfacePoint<double> none{};
+  const Vec3 behind(0.15, -0.15, 0);
+  EXPECT_FALSE(kernels::find_on_ellipsoid(blade, behind.data(), behind.data(), 0.0, step, none));
+}
+
+TEST(HairMeshEllipsoid, ReachesAsFarFromOblongBodies) {
+  const MeshEllipsoid<double> e = ellipsoid({0, 0, 0}, {0.5, 0.02, 0.1}, Eigen::Matrix3d::Identity());
+  for (const double angle : {0.0, 0.3, 0.8, 1.2, 1.5}) {
+    const Vec3 on(0.5 * std::cos(angle), 0.02 * std::sin(angle), 0);
+    const Vec3 normal = Vec3(on.x() / 0.25, on.y() / 0.0004, 0).normalized();
+    MeshSurfacePoint<double> found{};
+    for (const double above : {0.0049, 0.0051}) {
+      const Vec3 point = on + above * normal;
+      EXPECT_EQ(kernels::find_on_ellipsoid(e, point.data(), point.data(), 0.005, 1.0, found), above < 0.005);
+    }
+  }
 }
 
 TEST(HairMeshContact, FrictionIsCoulombs) {
@@ -96,7 +159,7 @@ TEST(HairMeshContact, AMeshOnASlopeSticksOrSlides) {
     // slope.
     const double tangent = 0.4;
     const Vec3 normal = Vec3(tangent, 1, 0).normalized(), down = Vec3(1, -tangent, 0).normalized();
-    const auto find = [&](const double* point, double reach, MeshSurfacePoint<double>& found) {
+    const auto find = [&](const double*, const double* point, double reach, MeshSurfacePoint<double>& found) {
       const double above = normal.dot(Vec3(point[0], point[1], point[2]));
       if (!(above < reach)) return false;
       for (int k = 0; k < 3; ++k)
@@ -138,7 +201,7 @@ TEST(HairMeshContact, AMeshThatIsPulledOffItsGroundLeavesIt) {
   parameters.held_roots = false, parameters.drag = 0;
   MeshRun<float> run(prism_column(4, 3, 0.1, 0.1), parameters);
   const float ground = 0.37F;
-  const auto find = [&](const float* point, float reach, MeshSurfacePoint<float>& found) {
+  const auto find = [&](const float*, const float* point, float reach, MeshSurfacePoint<float>& found) {
     if (!(point[1] - ground < reach)) return false;
     found = {{point[0], ground, point[2]}, {0, 1, 0}, {0, 0, 0}, 0.8F};
     return true;
@@ -188,6 +251,36 @@ TEST(HairMeshContact, MinimisingKeepsTheVolumeThroughACollision) {
   const double on = volume_after_a_blow(true), off = volume_after_a_blow(false);
   EXPECT_NEAR(on, 1, 0.02);
   EXPECT_GT(std::abs(off - 1), 0.02);
+}
+
+// A ball smaller than the faces of a hanging lock comes between its vertices: slowly, until it has pushed the
+// face aside by half of its width, and from one side to the other within one step. Returns how far the face
+// is left behind the ball's centre.
+double farthest_behind(double radius, double speed, int frames) {
+  MeshRun<float> run(hanging_lock(1, 4, 0.16, 0.3));
+  run.frames(48);
+  const double step = 1 / 24.0, level = -0.15;
+  kernels::MeshEllipsoid<float> ball{};
+  for (int k = 0; k < 3; ++k) ball.axis[k][k] = 1, ball.radius[k] = static_cast<float>(radius);
+  ball.centre[1] = static_cast<float>(level), ball.velocity[0] = static_cast<float>(speed);
+  double farthest = -1;
+  for (int frame = 1; frame <= frames; ++frame) {
+    ball.centre[0] = static_cast<float>(-0.3 + frame * step * speed);
+    run.frame();
+    run.solver->collide(&ball, 1), run.solver->minimise();
+    run.get();
+    // The lock's near face, between its second and third layer, whose middle the ball meets.
+    Vec3 middle = Vec3::Zero();
+    for (const int column : {0, 1})
+      for (const int layer : {1, 2}) middle += run.at(4 * column + layer) / 4;
+    if (ball.centre[0] > -0.08) farthest = std::max(farthest, ball.centre[0] - middle.x());
+  }
+  return farthest;
+}
+
+TEST(HairMeshContact, NothingSmallSlipsThroughAFace) {
+  EXPECT_LE(farthest_behind(0.06, 0.5, 13), 0);
+  EXPECT_LE(farthest_behind(0.06, 0.7 * 24, 1), 0);
 }
 
 }  // namespace

@@ -2,6 +2,8 @@
 // conditions.
 #include <gtest/gtest.h>
 
+#include <tuple>
+
 #include <algorithm>
 
 #include "kernels/hairmesh/hair_mesh_model.h"
@@ -360,6 +362,30 @@ TEST(HairMeshModel, MassesAndVolumeAreThoseOfAPrism) {
     mass = 0;
     for (int v = 0; v < mesh.topology.vertices(); ++v) mass += heavy.view().mass[v];
     EXPECT_NEAR(mass, 0.25, 1e-14);
+  }
+}
+
+// A straight column of two prisms of unlike lengths, bent by an angle at the layer between them: the energy
+// is B V kappa^2 / 2 with the curvature kappa = 2 sin(angle / 2) / l, l the mean of the lengths, and V of
+// both halves about the bend; where one length is under a quarter of the other, as much less as their ratio's
+// square is under a sixteenth.
+TEST(HairMeshModel, BendsWithTheCurvatureOfUnlikeEdges) {
+  const double side = 0.02, angle = 0.3;
+  for (const auto& [below, above, share] : {std::tuple(0.05, 0.05, 1.0), std::tuple(0.03, 0.09, 1.0),
+                                            std::tuple(0.09, 0.03, 1.0), std::tuple(0.1, 0.0125, 0.25)}) {
+    RestMesh mesh = prism_column(4, 3, side, 0.1);
+    for (int c = 0; c < 4; ++c)
+      mesh.rest[3 * (3 * c + 1) + 1] = below, mesh.rest[3 * (3 * c + 2) + 1] = below + above;
+    HairMeshParameters parameters;
+    parameters.held_roots = false;
+    parameters.bend = 0.07, parameters.bend_across = 0;
+    MeshRun<double> run(mesh, parameters);
+    for (int c = 0; c < 4; ++c)
+      run.put(3 * c + 2, mesh.at(3 * c + 1) + above * Eigen::Vector3d(std::sin(angle), std::cos(angle), 0));
+    run.set();
+    const double length = (below + above) / 2, volume = side * side * length,
+                 curvature = 2 * std::sin(angle / 2) / length;
+    EXPECT_NEAR(run.solver->energies().bend / (0.5 * 0.07 * volume * curvature * curvature), share, 1e-9);
   }
 }
 

@@ -148,7 +148,7 @@ TEST(HairMeshMinimisation, AgreesWithConstrainedLeastSquares) {
       v_after(before.size());
   s.solver.get_state(before.data(), v_before.data());
   // All that is external and on one side is moved by what depends on its place.
-  const auto find = [](const double* point, double, kernels::MeshSurfacePoint<double>& found) {
+  const auto find = [](const double*, const double* point, double, kernels::MeshSurfacePoint<double>& found) {
     if (!(point[0] > 0.06)) return false;
     found = {{0.06 - 0.2 * (point[0] - 0.06), point[1], point[2]}, {-1, 0, 0}, {0, 0, 0}, 0};
     return true;

@@ -50,11 +50,12 @@ constexpr Case kSchemaCases[] = {
     {R"({"model": {"type": "rods"}})",
      R"(scene#/model/type: found "rods", expected "ams", "mass_spring" or "hair_mesh")"},
     // minimum, maximum, exclusiveMinimum
-    {R"({"model": {"substeps": 0}})", "scene#/model/substeps: found 0, expected an integer from 1 to 1000"},
+    {R"({"model": {"substeps": 0}})",
+     "scene#/model/substeps: found 0, expected an integer from 1 to 1000, or an object"},
     {R"({"model": {"substeps": 1001}})",
-     "scene#/model/substeps: found 1001, expected an integer from 1 to 1000"},
+     "scene#/model/substeps: found 1001, expected an integer from 1 to 1000, or an object"},
     {R"({"model": {"substeps": 18446744073709551617}})",
-     "scene#/model/substeps: found 1.8446744073709552e+19, expected an integer from 1 to 1000"},
+     "scene#/model/substeps: found 1.8446744073709552e+19, expected an integer from 1 to 1000, or an object"},
     {R"({"model": {"drag": -1}})", "scene#/model/drag: found -1, expected a number from 0 to 1e+06 [1/s]"},
     {R"({"cache": {"error": 0}})", "scene#/cache/error: found 0, expected a number above 0 [units.length]"},
     // pattern, minLength, maxLength

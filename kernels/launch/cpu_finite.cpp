@@ -9,13 +9,19 @@ namespace {
 template <class R>
 bool finite(const Scalar<R>* values, std::int64_t count) {
   using T = Scalar<R>;
-  constexpr int kWidth = Traits<R>::kWidth, kSums = kLanes / kWidth;  // so many additions under way at once
+  constexpr int kWidth = Traits<R>::kWidth, kSums = 8;  // so many additions under way at once
   R sums[kSums];
   for (R& sum : sums) sum = R(0);
-  for (std::int64_t k = 0; k < count; k += kLanes)
+  std::int64_t k = 0;
+  for (; k + kSums * kWidth <= count; k += kSums * kWidth) {
+    RINGLET_UNROLL
     for (int s = 0; s < kSums; ++s) sums[s] = fma(R(0), load<R>(values + k + s * kWidth), sums[s]);
-  alignas(64) T left[kLanes];
-  for (int s = 0; s < kSums; ++s) store(left + s * kWidth, sums[s]);
+  }
+  for (; k < count; k += kWidth) sums[0] = fma(R(0), load<R>(values + k), sums[0]);
+  R sum = sums[0];
+  for (int s = 1; s < kSums; ++s) sum = sum + sums[s];
+  alignas(64) T left[kWidth];
+  store(left, sum);
   for (const T one : left)
     if (!(one == T(0))) return false;
   return true;

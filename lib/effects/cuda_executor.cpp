@@ -69,7 +69,6 @@ class CudaExecutor : public Executor<float> {
     });
   }
   void submit_roots(const state::StrandState<float>& state) override {
-    ++launches_;
     on_device([&] { strands_->upload_roots(state.root_motion, state.root_points); });
   }
   void fetch(state::StrandState<float>& state) override {

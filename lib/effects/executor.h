@@ -48,7 +48,7 @@ class Executor {
   // The contacts of hair against hair, on the host's copy of the strands: `fetch` before, `submit` after.
   virtual std::unique_ptr<kernels::HairContacts<T>> make_hair_contacts() = 0;
 
-  std::int64_t launches() const { return launches_; }  // of the steps above and of `submit_roots`, so far
+  std::int64_t launches() const { return launches_; }  // of the steps above, so far
 
  protected:
   std::int64_t launches_ = 0;

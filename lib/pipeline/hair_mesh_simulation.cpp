@@ -285,19 +285,23 @@ void HairMeshSimulation<T>::check(const char* stage, int frame) {
                    "the simulation diverged: a hair mesh's solve has no finite residual");
 }
 
-// The particle: the first that goes with the vertex, of the first strand that has one.
+// The particle: that which moves most with the vertex at rest, if one does.
 template <class T>
 void HairMeshSimulation<T>::tell(const char* stage, int frame, std::size_t k,
                                  const hairmesh::MeshDivergence& diverged) {
-  const Part<T>& part = parts_[k];
+  const groom::HairMeshStrands& strands = parts_[k].strands;
   const groom::HairMesh& mesh = world_.hair_meshes[k].mesh;
-  std::vector<Vec3> marked = mesh.positions, placed(part.strands.size() * part.strands.points());
-  marked[diverged.layer * mesh.vertices() + diverged.column].setConstant(std::nan(""));
-  part.strands.place(marked, placed);
-  const auto found = std::ranges::find_if(placed, [](const Vec3& x) { return !x.allFinite(); });
-  const std::int64_t at = found == placed.end() ? -1 : found - placed.begin();
-  const std::int64_t strand = part.first_strand + std::max<std::int64_t>(at, 0) / part.strands.points(),
-                     particle = at < 0 ? -1 : at % part.strands.points();
+  std::vector<Vec3> vertices = mesh.positions, rest(strands.size() * strands.points()), moved(rest.size());
+  strands.place(vertices, rest);
+  vertices[diverged.layer * mesh.vertices() + diverged.column].z() += 1e-6;
+  strands.place(vertices, moved);
+  double most = 0;
+  std::int64_t at = -1;
+  for (std::size_t i = 0; i < rest.size(); ++i)
+    if (const double way = (moved[i] - rest[i]).norm(); way > most)
+      most = way, at = static_cast<std::int64_t>(i);
+  const std::int64_t strand = parts_[k].first_strand + std::max<std::int64_t>(at, 0) / strands.points(),
+                     particle = at < 0 ? -1 : at % strands.points();
   throw Diverged(
       frame_now(frame), stage, strand, particle,
       fmt::format("the simulation diverged in stage `{}`: groom `{}`, vertex {} of layer {} of its hair "

@@ -152,6 +152,7 @@ class TypedSimulation : public Simulation {
   [[noreturn]] void tell_fault(const char* stage, int frame, const Fault& fault);
   [[noreturn]] void tell_limits(const char* stage, int frame, std::int64_t strand);
   state::Snapshot snapshot(int frame);
+  std::int64_t launches() const { return launches_ + executor_->launches(); }
   void hand_on(int frame, state::Frame out, double spent, state::FrameSink& sink);
   // How many substeps the frame that was stepped last had.
   int substeps() const { return control_ ? std::max(control_->substeps(), 1) : scene_.model.substeps; }
@@ -184,6 +185,7 @@ class TypedSimulation : public Simulation {
   std::function<void(const std::string&, int, int, state::Snapshot&)> probe_;
   effects::FrameReport report_;  // of the frame that is stepped, and the seconds of its stages
   StageSeconds seconds_;
+  std::int64_t launches_ = 0;  // that the roots were moved by, and those of executors that are no more
   Plan plan_;
 };
 
@@ -249,6 +251,7 @@ void TypedSimulation<T>::move_roots(double time) {
     state::set_root_motion(state_, model_.layout, strand, before_[strand], now_[strand]);
   });
   executor_->submit_roots(state_);
+  ++launches_;
 }
 
 template <class T>
@@ -287,10 +290,10 @@ template <class Work>
 void TypedSimulation<T>::timed(const char* name, const Work& work) {
   const Timer timer;
   trace::Span span(name, "stage");
-  const std::int64_t before = executor_->launches();
+  const std::int64_t before = launches();
   work();
   if (span.recorded()) {
-    span.tell("launches", static_cast<double>(executor_->launches() - before));
+    span.tell("launches", static_cast<double>(launches() - before));
     for (const PlannedStage& stage : plan_.stages)
       if (stage.name == name) span.tell("bytes", static_cast<double>(stage.bytes));
   }
@@ -440,6 +443,7 @@ void TypedSimulation<T>::resume(const state::Snapshot& snapshot) {
 // The strands have changed under the executor. The old one goes first: a device need not hold both.
 template <class T>
 void TypedSimulation<T>::renew_executor() {
+  launches_ += executor_->launches();
   executor_.reset();
   executor_ = make_executor(model_, options_);
 }

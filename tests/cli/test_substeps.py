@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from conftest import run
-from tiny import LENGTH, data_bytes, figures, frame_bytes, steps, strands, write_scene
+from tiny import LENGTH, data_bytes, figures, steps, strands, write_scene
 from tiny_mesh import write_mesh_scene
 
 LAST = 5
@@ -110,12 +110,14 @@ def test_the_most_substeps_are_told_where_they_are_not_enough(program, tmp_path)
 
 
 def test_what_too_few_substeps_break_more_mend(program, tmp_path):
-    """A try that leaves the limits is no more than a large error."""
+    """A try that leaves the limits is one of too few substeps."""
     scene = write_scene(tmp_path, blown, data_bytes(strands(32)))
-    options = ["--set=/limits/speed=2.2", "--set=/frames/last=2", "--set=/effects/wind/velocity=[300,0,0]"]
-    assert run(program, "run", scene, "-o", tmp_path / "few", *options, fixed(1)).returncode == 4
-    result = run(program, "run", scene, "-o", tmp_path / "few", "--overwrite", *options, chosen(1e-2, most=2))
-    assert result.returncode == 4, result.stderr
+    options = ["--set=/limits/edge_strain=0.19", "--set=/frames/last=2", "-q", "--progress=none", "--overwrite"]
+    assert run(program, "run", scene, "-o", tmp_path / "few", *options, fixed(8)).returncode == 4
+    result = run(program, "run", scene, "-o", tmp_path / "out", *options, chosen(0.5, most=64))
+    assert result.returncode == 0, result.stderr
+    assert figures(tmp_path / "out", "substeps")[1] == 32  # 16 and 32 are the first two that do not leave them
+    assert run(program, "run", scene, "-o", tmp_path / "out", *options, chosen(0.5, most=8)).returncode == 4
 
 
 # ---- The same bytes

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "core/log.h"
 #include "core/timer.h"
@@ -106,6 +107,7 @@ class HairMeshSimulation : public Simulation {
   Pose head_at(double time) const;
   Pose carrier(const scene::Ellipsoid& ellipsoid, const Pose& head, double time) const;
   void check(const char* stage, int frame);
+  std::optional<hairmesh::MeshDivergence> bad_contact(std::size_t part) const;
   [[noreturn]] void tell(const char* stage, int frame, std::size_t part,
                          const hairmesh::MeshDivergence& diverged);
   state::Frame frame_now(int frame);
@@ -276,10 +278,32 @@ void HairMeshSimulation<T>::probe(int frame, int number) {
   check("start", frame);
 }
 
+// A contact that remembers what is not finite.
+template <class T>
+std::optional<hairmesh::MeshDivergence> HairMeshSimulation<T>::bad_contact(std::size_t k) const {
+  if (!has_solids()) return std::nullopt;
+  state::Snapshot remembered;
+  parts_[k].body.save(remembered, "");
+  const std::vector<std::byte>& bytes = remembered.arrays.at("mesh_contacts");
+  std::vector<kernels::MeshContact<T>> contacts(bytes.size() / sizeof(kernels::MeshContact<T>));
+  std::memcpy(contacts.data(), bytes.data(), bytes.size());
+  const int layers = world_.hair_meshes[k].mesh.layers;
+  for (const kernels::MeshContact<T>& contact : contacts) {
+    T sum = contact.friction;
+    for (int c = 0; c < 3; ++c) sum += contact.normal[c] + contact.velocity[c] + contact.force[c];
+    if (std::isfinite(sum)) continue;
+    const auto column = static_cast<std::size_t>(contact.vertex / layers);
+    return hairmesh::MeshDivergence{column, contact.vertex % layers, "a value of its contact is not finite"};
+  }
+  return std::nullopt;
+}
+
 template <class T>
 void HairMeshSimulation<T>::check(const char* stage, int frame) {
-  for (std::size_t k = 0; k < parts_.size(); ++k)
+  for (std::size_t k = 0; k < parts_.size(); ++k) {
     if (const auto diverged = parts_[k].body.diverged(scene_.limits)) tell(stage, frame, k, *diverged);
+    if (const auto contact = bad_contact(k)) tell(stage, frame, k, *contact);
+  }
   if (!std::isfinite(taken_.residual) || !std::isfinite(taken_.minimise_residual))
     throw Diverged(frame_now(frame), stage, parts_[0].first_strand, -1,
                    "the simulation diverged: a hair mesh's solve has no finite residual");

@@ -96,8 +96,8 @@ class PipelineHealth : public testing::Test {
     return Simulation::create(scene::load(folder_ / "scene.json"), options);
   }
 
-  // Runs with `poison` after one stage of one substep; expects it to end before the next is poisoned, by the
-  // stage `found_after`, the frames before it handed on.
+  // Runs with `poison` after one stage of one substep; expects it to end there and then, the frames before it
+  // handed on.
   template <class Poison>
   Diverged run_poisoned(const char* text, Precision precision, const std::string& stage, int frame,
                         int substep, const Poison& poison) const {
@@ -114,7 +114,7 @@ class PipelineHealth : public testing::Test {
     } catch (const Diverged& failure) {
       EXPECT_TRUE(poisoned);
       EXPECT_EQ(failure.frame.number, frame);
-      EXPECT_EQ(failure.stage, found_after);
+      EXPECT_EQ(failure.stage, stage);
       EXPECT_EQ(sink.frames, frame - 1);
       return failure;
     }
@@ -147,13 +147,12 @@ class PipelineHealth : public testing::Test {
         if (!arrays.contains(place.array)) continue;
         if (stage.name == "roots" && place.per_particle) continue;  // before the stages that change those
         SCOPED_TRACE(std::string(place.array) + " after " + stage.name);
-        const Diverged failure =
-            run_poisoned(text, precision, stage.name, frame, substep, stage.name, [&](auto& all) {
-              if (std::string(place.array) == "root_points")
-                put<double>(all, place, value);
-              else
-                put<T>(all, place, value);
-            });
+        const Diverged failure = run_poisoned(text, precision, stage.name, frame, substep, [&](auto& all) {
+          if (std::string(place.array) == "root_points")
+            put<double>(all, place, value);
+          else
+            put<T>(all, place, value);
+        });
         EXPECT_EQ(failure.strand, kSick);
         EXPECT_EQ(failure.particle, place.per_particle ? kSickParticle : 0);
         EXPECT_THAT(failure.what(), testing::HasSubstr(std::string("`") + place.array + "`"));
@@ -197,8 +196,8 @@ TEST_F(PipelineHealth, OfHairMeshes) {
   for (const char* array : {"mesh_position", "mesh_velocity"})
     for (const int substep : {0, 1}) {
       SCOPED_TRACE(array);
-      const Diverged failure = run_poisoned(
-          kHairMesh, Precision::kDouble, "start", 3, substep, "start", [&](state::Snapshot& all) {
+      const Diverged failure =
+          run_poisoned(kHairMesh, Precision::kDouble, "start", 3, substep, [&](state::Snapshot& all) {
             double* values = reinterpret_cast<double*>(all.arrays.at(array).data());
             values[3 * (2 * 3 + 1)] = kNaN;  // column 2, layer 1 of 3
           });
@@ -208,20 +207,24 @@ TEST_F(PipelineHealth, OfHairMeshes) {
     }
 }
 
-// What contacts remember of the last substep is read by the next one's solve, which spreads it over the mesh.
 TEST_F(PipelineHealth, OfAHairMeshsContacts) {
-  const std::string text = std::string(kHairMesh).replace(
-      std::string(kHairMesh).find("\"substeps\": 2"), 13,
-      R"("substeps": 2, "hair_mesh": {"ellipsoids": [{"centre": [0.05, 0, 0.05], "radii": [0.2, 0.15, 0.2]}]})");
-  const Diverged failure =
-      run_poisoned(text.c_str(), Precision::kDouble, "start", 3, 1, "solve", [](auto& all) {
-        std::vector<std::byte>& bytes = all.arrays.at("mesh_contacts");
-        ASSERT_GE(bytes.size(), sizeof(kernels::MeshContact<double>));
-        kernels::MeshContact<double> contact;
-        std::memcpy(&contact, bytes.data(), sizeof contact);
-        contact.normal[1] = kNaN;
-        std::memcpy(bytes.data(), &contact, sizeof contact);
-      });
+  std::string text = kHairMesh;
+  const std::string two = R"("substeps": 2)";
+  text.replace(
+      text.find(two), two.size(),
+      two + R"(, "hair_mesh": {"ellipsoids": [{"centre": [0.05, 0, 0.05], "radii": [0.2, 0.15, 0.2]}]})");
+  std::int32_t vertex = -1;
+  const Diverged failure = run_poisoned(text.c_str(), Precision::kDouble, "start", 3, 1, [&](auto& all) {
+    std::vector<std::byte>& bytes = all.arrays.at("mesh_contacts");
+    kernels::MeshContact<double> contact{};
+    ASSERT_GE(bytes.size(), sizeof contact);
+    std::memcpy(&contact, bytes.data(), sizeof contact);
+    vertex = contact.vertex, contact.normal[1] = kNaN;
+    std::memcpy(bytes.data(), &contact, sizeof contact);
+  });
+  const std::string named =
+      "vertex " + std::to_string(vertex / 3) + " of layer " + std::to_string(vertex % 3);
+  EXPECT_THAT(failure.what(), testing::HasSubstr(named));
   EXPECT_GE(failure.strand, 0);
   EXPECT_GE(failure.particle, 0);
 }

@@ -320,6 +320,8 @@ Report describe_scene(const InfoOptions& options) {
   for (const scene::Groom& groom : scene.grooms)
     report["grooms"][groom.name] = groom.file ? groom.file->string() : "grown";
   report["substeps"] = scene.model.substeps;
+  if (const auto& choice = scene.model.substep_choice)
+    report["substeps"] = {{"tolerance", choice->tolerance}, {"min", choice->min}, {"max", choice->max}};
   report["solids"] = Report::array();
   for (const scene::Solid& solid : scene.effects.solids) report["solids"].push_back(solid.name);
   report["cache_fields"] = scene.cache.fields;

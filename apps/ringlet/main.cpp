@@ -61,6 +61,9 @@ void add_run(CLI::App& app, const bool& quiet, Job& job) {
   command->add_option("--progress", options->progress, "how to tell how far it is")
       ->check(CLI::IsMember({"auto", "bar", "plain", "json", "none"}))
       ->option_text("auto/bar/plain/json/none");
+  command
+      ->add_option("--trace", options->trace, "write where the time went, for chrome://tracing or Perfetto")
+      ->option_text("FILE");
   command->callback([options, &quiet, &job] {
     job = [options, &quiet] {
       if (quiet && options->progress == "auto") options->progress = "none";

@@ -13,6 +13,7 @@ struct RunOptions {
   std::string frames;            // A-B, or A; empty: the scene's
   bool resume = false, overwrite = false;
   std::string progress = "auto";
+  std::filesystem::path trace;  // empty: none
 };
 
 // Simulates and writes the cache. Returns 0, or 128 + n where signal n stopped it. Throws Error.

@@ -19,6 +19,7 @@
 #include "cache/resume.h"
 #include "core/error.h"
 #include "core/log.h"
+#include "core/trace.h"
 
 namespace ringlet::cache {
 namespace fs = std::filesystem;
@@ -102,6 +103,7 @@ struct CacheWriter::Impl {
   // ---- The writing thread -----------------------------------------------------------------------
 
   void run() {
+    trace::name_thread("writing");
     try {
       for (std::optional<Item> item; next(item);) {
         if (item) store(std::move(*item));
@@ -135,6 +137,8 @@ struct CacheWriter::Impl {
   }
 
   void store(Item item) {
+    trace::Span span("write", "cache");
+    span.tell("frame", item.frame.number);
     const fs::path path = files.frame(item.frame.number);
     {
       const h5::Image image(path, bytes_of(item.frame));
@@ -150,6 +154,7 @@ struct CacheWriter::Impl {
   }
 
   void publish() {
+    const trace::Span span("publish", "cache");
     const Clock::time_point start = Clock::now();
     if (unpublished_state) write_state();
     if (master_stale) write_master();

@@ -79,6 +79,7 @@ class CudaExecutor : public Executor<float> {
   }
 
   void strand_step(const kernels::StrandStep<float>& step) override {
+    ++launches_;
     on_device([&] {
       strands_->strand_step(step);
       strands_->download_figures({step.figures, lanes_ * kernels::kFigures}, {});
@@ -86,6 +87,7 @@ class CudaExecutor : public Executor<float> {
   }
 
   void contact_step(const kernels::ContactStep<float>& step, int frame) override {
+    ++launches_;
     on_device([&] {
       if (!skin_known_) strands_->upload_skin({step.skin, lanes_});
       skin_known_ = true;
@@ -98,12 +100,15 @@ class CudaExecutor : public Executor<float> {
   }
 
   void wind_step(const kernels::WindStep<float>& step) override {
+    ++launches_;
     on_device([&] { strands_->wind_step(step); });
   }
   void shelter_step(const kernels::ShelterStep<float>& step) override {
+    ++launches_;
     on_device([&] { strands_->shelter_step(step); });
   }
   void length_step(const kernels::LengthStep<float>& step) override {
+    ++launches_;
     on_device([&] {
       strands_->length_step(step);
       strands_->download_figures({}, {}, {step.figures, lanes_ * kernels::kLengthFigures});

@@ -45,6 +45,7 @@ class CpuExecutor : public Executor<T> {
  private:
   template <class Step>
   void run(void (*kernel)(const Step&, int, int, T*), const Step& step) {
+    ++this->launches_;
     constexpr int kGrain = 8;  // batches: some 10 microseconds of work
     tbb::parallel_for(tbb::blocked_range<int>(0, batches_, kGrain),
                       [&](const tbb::blocked_range<int>& range) {

@@ -1,5 +1,6 @@
 // Where the kernels run: on the CPU's threads, or on a CUDA device.
 #pragma once
+#include <cstdint>
 #include <memory>
 #include <string>
 
@@ -46,6 +47,11 @@ class Executor {
   virtual std::unique_ptr<kernels::HairGrid<T>> make_hair_grid() = 0;
   // The contacts of hair against hair, on the host's copy of the strands: `fetch` before, `submit` after.
   virtual std::unique_ptr<kernels::HairContacts<T>> make_hair_contacts() = 0;
+
+  std::int64_t launches() const { return launches_; }  // of the steps above, so far
+
+ protected:
+  std::int64_t launches_ = 0;
 };
 
 // `instruction_set`: avx512, avx2 or generic; empty: the widest this processor has. Throws Error{kUsage} for

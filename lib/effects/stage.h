@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "effects/executor.h"
+#include "effects/launches.h"
 #include "state/frame.h"
 #include "state/strand_model.h"
 
@@ -17,6 +18,7 @@ struct Substep {
   int frame;
   double time_before, time, step;
   bool first_of_frame, last_of_frame;
+  int substeps;  // of this frame
 };
 
 // What a frame looked like strand by strand, gathered by the stages over its substeps.
@@ -53,9 +55,9 @@ template <class T>
 class Stage {
  public:
   virtual ~Stage() = default;
-  virtual std::string name() const = 0;
-  virtual std::size_t bytes() const = 0;      // that it owns
-  virtual std::int64_t launches() const = 0;  // kernel launches a frame
+  virtual const char* name() const = 0;
+  virtual std::size_t bytes() const = 0;              // that it owns
+  virtual Launches launches(int substeps) const = 0;  // of a frame of so many
   // `rest`: the strands at rest, posed by the roots at the run's first time. Before anything is stepped, and
   // whenever grooming has changed the model. The executor holds this state too.
   virtual void at_rest(Executor<T>&, const state::StrandState<T>& /*rest*/) {}
@@ -63,7 +65,7 @@ class Stage {
   virtual void begin(Executor<T>&, const Substep&) {}
   virtual void run(Executor<T>& executor, const Substep& substep, FrameReport& report) = 0;
   // What it keeps from one frame to the next beside the state, into and out of a checkpoint: at a frame's
-  // end, when the host has the state; after `at_rest`.
+  // end, when the host has the state; after `at_rest`, and before a frame is taken once more.
   virtual void save(state::Snapshot&) {}
   virtual void restore(const state::Snapshot&) {}
   // The first strand that diverged in the last `run`, -1 for none.

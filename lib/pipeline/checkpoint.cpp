@@ -11,7 +11,7 @@ namespace {
 
 // Calls visit(name, array) for every array of a checkpoint that this run has.
 template <class Model, class State, class Visit>
-void each_array(Model& model, State& state, bool groomed, const Visit& visit) {
+void each_array(Model& model, State& state, Arrays arrays, const Visit& visit) {
   const auto if_there = [&](const char* name, auto& array) {
     if (!array.empty()) visit(name, array);
   };
@@ -21,7 +21,12 @@ void each_array(Model& model, State& state, bool groomed, const Visit& visit) {
   if_there("shelter", state.shelter);
   if_there("companion_position", state.companion_position);
   if_there("companion_velocity", state.companion_velocity);
-  if (!groomed) return;
+  if (arrays == Arrays::kAll) {
+    if_there("air", state.air);
+    if_there("root_motion", state.root_motion);
+    if_there("root_points", state.root_points);
+  }
+  if (arrays != Arrays::kStateAndModel) return;
   if_there("count", model.count);
   if_there("rest", model.rest);
   if_there("rest_length", model.rest_length);
@@ -33,12 +38,12 @@ void each_array(Model& model, State& state, bool groomed, const Visit& visit) {
 
 template <class T>
 state::Snapshot save(int frame, const state::StrandModel<T>& model, const state::StrandState<T>& state,
-                     bool groomed) {
+                     Arrays arrays) {
   state::Snapshot snapshot;
   snapshot.frame = frame;
-  each_array(model, state, groomed, [&](const char* name, const auto& array) {
+  each_array(model, state, arrays, [&](const char* name, const auto& array) {
     std::vector<std::byte>& bytes = snapshot.arrays[name];
-    bytes.resize(array.size() * sizeof(T));
+    bytes.resize(array.size() * sizeof array[0]);
     std::memcpy(bytes.data(), array.data(), bytes.size());
   });
   return snapshot;
@@ -46,10 +51,10 @@ state::Snapshot save(int frame, const state::StrandModel<T>& model, const state:
 
 template <class T>
 void restore(const state::Snapshot& snapshot, state::StrandModel<T>& model, state::StrandState<T>& state,
-             bool groomed) {
-  each_array(model, state, groomed, [&](const char* name, auto& array) {
+             Arrays arrays) {
+  each_array(model, state, arrays, [&](const char* name, auto& array) {
     const auto found = snapshot.arrays.find(name);
-    const std::size_t size = array.size() * sizeof(T);
+    const std::size_t size = array.size() * sizeof array[0];
     if (found == snapshot.arrays.end() || found->second.size() != size)
       throw Error(ErrorKind::kInput, "state", fmt::format("`{}` is missing or of another size", name),
                   "run without --resume");
@@ -57,10 +62,12 @@ void restore(const state::Snapshot& snapshot, state::StrandModel<T>& model, stat
   });
 }
 
-template state::Snapshot save(int, const state::StrandModel<float>&, const state::StrandState<float>&, bool);
+template state::Snapshot save(int, const state::StrandModel<float>&, const state::StrandState<float>&,
+                              Arrays);
 template state::Snapshot save(int, const state::StrandModel<double>&, const state::StrandState<double>&,
-                              bool);
-template void restore(const state::Snapshot&, state::StrandModel<float>&, state::StrandState<float>&, bool);
-template void restore(const state::Snapshot&, state::StrandModel<double>&, state::StrandState<double>&, bool);
+                              Arrays);
+template void restore(const state::Snapshot&, state::StrandModel<float>&, state::StrandState<float>&, Arrays);
+template void restore(const state::Snapshot&, state::StrandModel<double>&, state::StrandState<double>&,
+                      Arrays);
 
 }  // namespace ringlet::pipeline

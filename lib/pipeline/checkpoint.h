@@ -5,14 +5,17 @@
 
 namespace ringlet::pipeline {
 
-// `groomed`: strands change during the run, so the checkpoint holds them too.
+// What goes into it: the state; with what grooming changes of the model; or every array of the state, those
+// too that each substep makes anew.
+enum class Arrays { kState, kStateAndModel, kAll };
+
 template <class T>
 state::Snapshot save(int frame, const state::StrandModel<T>& model, const state::StrandState<T>& state,
-                     bool groomed);
+                     Arrays arrays);
 
 // Throws Error{kInput} where the snapshot lacks an array or has one of another size.
 template <class T>
 void restore(const state::Snapshot& snapshot, state::StrandModel<T>& model, state::StrandState<T>& state,
-             bool groomed);
+             Arrays arrays);
 
 }  // namespace ringlet::pipeline

@@ -108,9 +108,9 @@ std::vector<Vec3> follow(const World& world, const std::vector<Vec3>& guides, do
 // velocity of a root, so that a follower of a guide that moves rigidly has that guide's.
 std::vector<Vec3> follow_velocities(const scene::Scene& scene, const World& world,
                                     const std::vector<Vec3>& guides, const std::vector<Vec3>& velocities,
-                                    const std::vector<Vec3>& now, double time) {
+                                    const std::vector<Vec3>& now, double time, double step) {
   std::vector<Vec3> out(now.size(), Vec3::Zero());
-  const double step = 1 / (scene.frames.fps * scene.model.substeps), first = first_time(scene.frames);
+  const double first = first_time(scene.frames);
   if (time < first + 0.5 * step) return out;  // nothing has moved yet
   std::vector<Vec3> before = guides;
   for (std::size_t i = 0; i < before.size(); ++i) before[i] -= step * velocities[i];
@@ -138,7 +138,7 @@ state::Figures follower_figures(const World& world, const std::vector<Vec3>& now
 }
 
 template <class T>
-void add_strands(const scene::Scene& scene, const World& world, const Simulated<T>& simulated,
+void add_strands(const scene::Scene& scene, const World& world, const Simulated<T>& simulated, double step,
                  state::Frame& frame) {
   const double unit = scene.units.metres_per_unit;
   const bool velocity = asks_for(scene, "velocity"), elongation = asks_for(scene, "elongation");
@@ -155,7 +155,7 @@ void add_strands(const scene::Scene& scene, const World& world, const Simulated<
   if (scene.cache.strands == scene::StoredStrands::kBoth) frame.guide_position = in_units(positions, unit);
   if (velocity)
     frame.velocity = in_units(
-        follow_velocities(scene, world, positions, simulated.velocities(), followed, frame.time), unit);
+        follow_velocities(scene, world, positions, simulated.velocities(), followed, frame.time, step), unit);
   if (!elongation) return;
   frame.elongation.resize(frame.position.size() / 3);
   world.interpolation().blend(simulated.elongations(), frame.elongation);
@@ -209,11 +209,11 @@ state::RunHeader make_header(const scene::Scene& scene, const World& world) {
 
 template <class T>
 state::Frame make_frame(const scene::Scene& scene, const World& world, const state::StrandModel<T>& model,
-                        const state::StrandState<T>& state, int number, double time) {
+                        const state::StrandState<T>& state, int number, double time, double step) {
   state::Frame frame;
   frame.number = number;
   frame.time = time;
-  add_strands(scene, world, Simulated<T>{model, state, world.simulated.strands.offsets}, frame);
+  add_strands(scene, world, Simulated<T>{model, state, world.simulated.strands.offsets}, step, frame);
   if (!scene.effects.grooming.empty()) {
     // Grooming is for grooms whose strands are all simulated; of the others every strand keeps its particles.
     const StrandSet& set = strands_of_cache(world);
@@ -237,8 +237,8 @@ state::Frame make_frame(const scene::Scene& scene, const World& world, std::span
 }
 
 template state::Frame make_frame(const scene::Scene&, const World&, const state::StrandModel<float>&,
-                                 const state::StrandState<float>&, int, double);
+                                 const state::StrandState<float>&, int, double, double);
 template state::Frame make_frame(const scene::Scene&, const World&, const state::StrandModel<double>&,
-                                 const state::StrandState<double>&, int, double);
+                                 const state::StrandState<double>&, int, double, double);
 
 }  // namespace ringlet::pipeline

@@ -14,11 +14,11 @@ bool asks_for(const scene::Scene& scene, const char* field);
 // Everything but the machine and the range of frames.
 state::RunHeader make_header(const scene::Scene& scene, const World& world);
 
-// Frame `number`, at `time` [s], without the solver's figures. Of strands that are shorter than there is room
-// for, the particles beyond the tip lie on it.
+// Frame `number`, at `time` [s], without the solver's figures; `step`: the substep that led there [s]. Of
+// strands that are shorter than there is room for, the particles beyond the tip lie on it.
 template <class T>
 state::Frame make_frame(const scene::Scene& scene, const World& world, const state::StrandModel<T>& model,
-                        const state::StrandState<T>& state, int number, double time);
+                        const state::StrandState<T>& state, int number, double time, double step);
 
 // The same of strands that something else than a strand model places: [particles] in the world [m], [m/s].
 state::Frame make_frame(const scene::Scene& scene, const World& world, std::span<const Vec3> positions,

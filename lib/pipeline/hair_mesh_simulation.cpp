@@ -5,13 +5,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "core/log.h"
 #include "core/timer.h"
+#include "core/trace.h"
 #include "effects/instruction_set.h"
 #include "effects/wind/wind_field.h"
 #include "hairmesh/body.h"
 #include "pipeline/frames.h"
+#include "pipeline/substep_control.h"
 #include "pipeline/world.h"
 #include "solids/keyframes.h"
 
@@ -69,6 +72,7 @@ class HairMeshSimulation : public Simulation {
       wind_.emplace(*scene_.effects.wind, scene_.frames, parts_[0].body.origin());
       for (Part<T>& part : parts_) part.air.resize(part.body.positions().size());
     }
+    if (scene_.model.substep_choice) control_.emplace(*scene_.model.substep_choice, mean_length(world_));
     make_plan(strands, particles);
   }
 
@@ -88,24 +92,34 @@ class HairMeshSimulation : public Simulation {
 
  private:
   bool has_solids() const { return !world_.solids.empty() || !scene_.model.hair_mesh->ellipsoids.empty(); }
-  double time_of(int frame, int substep) const { return pipeline::time_of(scene_, frame, substep); }
+  double time_of(int frame, int substep = 0, int substeps = 1) const {
+    return pipeline::time_of(scene_.frames, frame, substep, substeps);
+  }
 
   void make_plan(std::int64_t strands, std::int64_t particles);
   void step_frame(int frame);
+  void take_frame(int frame, int substeps);
+  std::vector<double> vertices() const;
+  void probe(int frame, int number);
   void substep(int frame, double before, double now);
   void blow(double time);
   void collide(double before, double now);
   Pose head_at(double time) const;
   Pose carrier(const scene::Ellipsoid& ellipsoid, const Pose& head, double time) const;
-  void check(int frame);
+  void check(const char* stage, int frame);
+  std::optional<hairmesh::MeshDivergence> bad_contact(std::size_t part) const;
+  [[noreturn]] void tell(const char* stage, int frame, std::size_t part,
+                         const hairmesh::MeshDivergence& diverged);
   state::Frame frame_now(int frame);
   state::Figures figures() const;
   state::Snapshot snapshot(int frame) const;
   void resume(const state::Snapshot& snapshot);
+  void set_state(const state::Snapshot& snapshot);
 
   template <class Work>
   void timed(const char* name, const Work& work) {
     const Timer timer;
+    const trace::Span span(name, "stage");
     work();
     for (auto& [stage, spent] : seconds_)
       if (stage == name) spent += timer.seconds();
@@ -119,14 +133,15 @@ class HairMeshSimulation : public Simulation {
   std::vector<Vec3> points_, speeds_;  // [particles] of the cache
   hairmesh::FrameFigures taken_;
   StageSeconds seconds_;
+  std::optional<SubstepControl> control_;  // where the scene leaves the substeps to it
+  std::function<void(const std::string&, int, int, state::Snapshot&)> probe_;
   Plan plan_;
 };
 
 template <class T>
 void HairMeshSimulation<T>::make_plan(std::int64_t strands, std::int64_t particles) {
+  plan_ = frames_planned(scene_, control_ ? &*control_ : nullptr);
   plan_.strands = strands, plan_.particles = particles;
-  plan_.substeps = scene_.model.substeps;
-  plan_.frames = scene_.frames.last - scene_.frames.first + scene_.frames.preroll;
   std::size_t bodies = 0, roots = 0, air = 0, generators = (points_.size() + speeds_.size()) * sizeof(Vec3),
               solids = 0;
   for (const Part<T>& part : parts_) {
@@ -136,7 +151,7 @@ void HairMeshSimulation<T>::make_plan(std::int64_t strands, std::int64_t particl
   }
   for (const solids::Solid& solid : world_.solids) solids += solid.bytes();
   const auto add = [&](const char* name, const char* what, bool runs, std::size_t bytes) {
-    plan_.stages.push_back({name, what, runs, runs ? bytes : 0, 0});  // no kernels of a device
+    plan_.stages.push_back({name, what, runs, runs ? bytes : 0, {0, 0}});  // no kernels of a device
     if (runs) seconds_.emplace_back(name, 0.0);
   };
   add("roots", "the scalp's vertices carried by the head", true, roots);
@@ -209,37 +224,114 @@ void HairMeshSimulation<T>::substep(int frame, double before, double now) {
   timed("solve", [&] {
     for (Part<T>& part : parts_) part.body.solve(taken_);
   });
-  check(frame);
+  check("solve", frame);
   if (!has_solids()) return;
   timed("solids", [&] { collide(before, now); });
+  check("solids", frame);
   if (scene_.model.hair_mesh->deformation_minimisation)
     timed("minimisation", [&] {
       for (Part<T>& part : parts_) part.body.minimise(taken_);
     });
-  check(frame);
+  check("minimisation", frame);
 }
 
 template <class T>
 void HairMeshSimulation<T>::step_frame(int frame) {
-  taken_ = {};
   for (auto& [stage, spent] : seconds_) spent = 0;
-  for (int s = 0; s < scene_.model.substeps; ++s)
-    substep(frame, time_of(frame - 1, s), time_of(frame - 1, s + 1));
+  if (!control_) return take_frame(frame, scene_.model.substeps);
+  const state::Snapshot start = snapshot(frame - 1);
+  const std::vector<double> before = vertices();
+  bool again = false;
+  control_->step(frame, static_cast<double>(before.size()) / 3, [&](int substeps) {
+    if (again) set_state(start);
+    again = true;
+    take_frame(frame, substeps);
+    return vertices();
+  });
 }
 
 template <class T>
-void HairMeshSimulation<T>::check(int frame) {
-  if (!std::isfinite(taken_.residual) || !std::isfinite(taken_.minimise_residual))
-    throw Diverged(frame_now(frame), "solve", parts_[0].first_strand, -1,
-                   "the simulation diverged: a hair mesh's solve has no finite residual");
-  for (std::size_t k = 0; k < parts_.size(); ++k) {
-    const auto diverged = parts_[k].body.diverged(scene_.limits);
-    if (!diverged) continue;
-    throw Diverged(
-        frame_now(frame), "solve", parts_[k].first_strand, -1,
-        fmt::format("the simulation diverged: groom `{}`, vertex {} of layer {} of its hair mesh: {}",
-                    scene_.grooms[k].name, diverged->column, diverged->layer, diverged->what));
+void HairMeshSimulation<T>::take_frame(int frame, int substeps) {
+  taken_ = {};
+  for (int s = 0; s < substeps; ++s) {
+    trace::Span span("substep");
+    span.tell("frame", frame), span.tell("substep", s);
+    probe(frame, s);
+    substep(frame, time_of(frame - 1, s, substeps), time_of(frame - 1, s + 1, substeps));
   }
+}
+
+template <class T>
+std::vector<double> HairMeshSimulation<T>::vertices() const {
+  std::vector<double> all;
+  for (const Part<T>& part : parts_)
+    for (const Vec3& x : part.body.positions()) all.insert(all.end(), x.begin(), x.end());
+  return all;
+}
+
+template <class T>
+void HairMeshSimulation<T>::probe(int frame, int number) {
+  if (!probe_) return;
+  state::Snapshot arrays = snapshot(frame);
+  probe_("start", frame, number, arrays);
+  set_state(arrays);
+  check("start", frame);
+}
+
+// A contact that remembers what is not finite.
+template <class T>
+std::optional<hairmesh::MeshDivergence> HairMeshSimulation<T>::bad_contact(std::size_t k) const {
+  if (!has_solids()) return std::nullopt;
+  state::Snapshot remembered;
+  parts_[k].body.save(remembered, "");
+  const std::vector<std::byte>& bytes = remembered.arrays.at("mesh_contacts");
+  std::vector<kernels::MeshContact<T>> contacts(bytes.size() / sizeof(kernels::MeshContact<T>));
+  std::memcpy(contacts.data(), bytes.data(), bytes.size());
+  const int layers = world_.hair_meshes[k].mesh.layers;
+  for (const kernels::MeshContact<T>& contact : contacts) {
+    T sum = contact.friction;
+    for (int c = 0; c < 3; ++c) sum += contact.normal[c] + contact.velocity[c] + contact.force[c];
+    if (std::isfinite(sum)) continue;
+    const auto column = static_cast<std::size_t>(contact.vertex / layers);
+    return hairmesh::MeshDivergence{column, contact.vertex % layers, "a value of its contact is not finite"};
+  }
+  return std::nullopt;
+}
+
+template <class T>
+void HairMeshSimulation<T>::check(const char* stage, int frame) {
+  for (std::size_t k = 0; k < parts_.size(); ++k) {
+    if (const auto diverged = parts_[k].body.diverged(scene_.limits)) tell(stage, frame, k, *diverged);
+    if (const auto contact = bad_contact(k)) tell(stage, frame, k, *contact);
+  }
+  if (!std::isfinite(taken_.residual) || !std::isfinite(taken_.minimise_residual))
+    throw Diverged(frame_now(frame), stage, parts_[0].first_strand, -1,
+                   "the simulation diverged: a hair mesh's solve has no finite residual");
+}
+
+// The particle: that which moves most with the vertex at rest, if one does.
+template <class T>
+void HairMeshSimulation<T>::tell(const char* stage, int frame, std::size_t k,
+                                 const hairmesh::MeshDivergence& diverged) {
+  const groom::HairMeshStrands& strands = parts_[k].strands;
+  const groom::HairMesh& mesh = world_.hair_meshes[k].mesh;
+  std::vector<Vec3> vertices = mesh.positions, rest(strands.size() * strands.points()), moved(rest.size());
+  strands.place(vertices, rest);
+  vertices[diverged.layer * mesh.vertices() + diverged.column].z() += 1e-6;
+  strands.place(vertices, moved);
+  double most = 0;
+  std::int64_t at = -1;
+  for (std::size_t i = 0; i < rest.size(); ++i)
+    if (const double way = (moved[i] - rest[i]).norm(); way > most)
+      most = way, at = static_cast<std::int64_t>(i);
+  const std::int64_t strand = parts_[k].first_strand + std::max<std::int64_t>(at, 0) / strands.points(),
+                     particle = at < 0 ? -1 : at % strands.points();
+  throw Diverged(
+      frame_now(frame), stage, strand, particle,
+      fmt::format("the simulation diverged in stage `{}`: groom `{}`, vertex {} of layer {} of its hair "
+                  "mesh, strand {}, particle {}: {}",
+                  stage, scene_.grooms[k].name, diverged.column, diverged.layer, strand, particle,
+                  diverged.what));
 }
 
 template <class T>
@@ -251,7 +343,7 @@ state::Frame HairMeshSimulation<T>::frame_now(int frame) {
     if (!speeds_.empty())
       part.strands.place(part.body.velocities(), std::span(speeds_).subspan(first, count));
   }
-  return make_frame(scene_, world_, points_, speeds_, frame, time_of(frame, 0));
+  return make_frame(scene_, world_, points_, speeds_, frame, time_of(frame));
 }
 
 template <class T>
@@ -293,11 +385,19 @@ state::Snapshot HairMeshSimulation<T>::snapshot(int frame) const {
   snapshot.frame = frame;
   for (std::size_t k = 0; k < parts_.size(); ++k)
     parts_[k].body.save(snapshot, k == 0 ? "" : fmt::format("_{}", k));
+  if (control_) control_->save(snapshot);
   return snapshot;
 }
 
 template <class T>
 void HairMeshSimulation<T>::resume(const state::Snapshot& snapshot) {
+  if (control_) control_->restore(snapshot);
+  set_state(snapshot);
+  check("resume", snapshot.frame);
+}
+
+template <class T>
+void HairMeshSimulation<T>::set_state(const state::Snapshot& snapshot) {
   for (std::size_t k = 0; k < parts_.size(); ++k)
     parts_[k].body.restore(snapshot, k == 0 ? "" : fmt::format("_{}", k));
 }
@@ -305,10 +405,15 @@ void HairMeshSimulation<T>::resume(const state::Snapshot& snapshot) {
 template <class T>
 bool HairMeshSimulation<T>::run(const FrameRange& range, state::FrameSink& sink, const RunControl& control) {
   int frame = scene_.frames.first - scene_.frames.preroll;
+  probe_ = control.probe;
   const auto hand_on = [&](double spent) {
     state::Frame out;
     timed("strands", [&] { out = frame_now(frame); });
     out.figures = figures();
+    if (control_) {
+      const state::Figures chosen = control_->figures();
+      out.figures.insert(out.figures.end(), chosen.begin(), chosen.end());
+    }
     sink.write(std::move(out), snapshot(frame), spent);
   };
   for (Part<T>& part : parts_) {
@@ -324,10 +429,13 @@ bool HairMeshSimulation<T>::run(const FrameRange& range, state::FrameSink& sink,
   while (frame < range.last) {
     if (control.stop && *control.stop) return false;
     const Timer timer;
+    trace::Span span("frame");
     ++frame;
+    span.tell("frame", frame);
     step_frame(frame);
     if (frame >= range.first) hand_on(timer.seconds());
     if (control.on_frame) control.on_frame(frame, timer.seconds(), seconds_);
+    trace::flush();
   }
   sink.finish();
   return true;

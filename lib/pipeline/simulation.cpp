@@ -9,6 +9,7 @@
 
 #include "core/log.h"
 #include "core/timer.h"
+#include "core/trace.h"
 #include "effects/contacts/contacts_stage.h"
 #include "effects/grid/grid_stage.h"
 #include "effects/grooming/grooming.h"
@@ -18,7 +19,9 @@
 #include "pipeline/checkpoint.h"
 #include "pipeline/frames.h"
 #include "pipeline/hair_mesh_simulation.h"
+#include "pipeline/health.h"
 #include "pipeline/report.h"
+#include "pipeline/substep_control.h"
 #include "pipeline/world.h"
 
 namespace ringlet::pipeline {
@@ -110,6 +113,7 @@ class TypedSimulation : public Simulation {
         executor_(make_executor(model_, options_)),
         before_(roots_.strands()),
         now_(roots_.strands()) {
+    if (scene_.model.substep_choice) control_.emplace(*scene_.model.substep_choice, mean_length(world_));
     if (scene_.effects.wind)
       stages_.push_back(
           effects::make_wind_stage<T>(scene_, world_.head.get(), roots_.centre(), model_, state_));
@@ -137,14 +141,35 @@ class TypedSimulation : public Simulation {
   void resume(const state::Snapshot& snapshot);
   void groom(int frame);
   void renew_executor();
-  void step_frame(int frame, effects::FrameReport& report, StageSeconds& seconds);
+  void step_frame(int frame);
+  void take_frame(int frame, int substeps);
+  void take_chosen(int frame);
+  void take_substep(const effects::Substep& substep, int number);
   void move_roots(double time);
-  void check(const effects::Stage<T>& stage, int frame);
+  void probe(const char* stage, int frame, int substep);
+  void check(const char* stage, int frame, std::int64_t diverged);
+  void check_fetched(const char* stage, int frame);
+  [[noreturn]] void tell_fault(const char* stage, int frame, const Fault& fault);
+  [[noreturn]] void tell_limits(const char* stage, int frame, std::int64_t strand);
+  state::Snapshot snapshot(int frame);
+  std::int64_t launches() const { return launches_ + executor_->launches(); }
+  void hand_on(int frame, state::Frame out, double spent, state::FrameSink& sink);
+  // How many substeps the frame that was stepped last had.
+  int substeps() const { return control_ ? std::max(control_->substeps(), 1) : scene_.model.substeps; }
   state::Frame frame_now(int frame) const {
-    return make_frame(scene_, world_, model_, state_, frame, time_of(frame, 0));
+    return make_frame(scene_, world_, model_, state_, frame, time_of(frame),
+                      1 / (scene_.frames.fps * substeps()));
   }
+  double time_of(int frame, int substep = 0, int substeps = 1) const {
+    return pipeline::time_of(scene_.frames, frame, substep, substeps);
+  }
+  Arrays kept() const { return grooming_ ? Arrays::kStateAndModel : Arrays::kState; }
+  // A device's state is not looked at but when it has been fetched.
+  bool on_host() const { return executor_->backend() == "cpu"; }
 
-  double time_of(int frame, int substep) const { return pipeline::time_of(scene_, frame, substep); }
+  // Does a part of a frame that the plan names, and counts its time there.
+  template <class Work>
+  void timed(const char* name, const Work& work);
 
   scene::Scene scene_;
   Options options_;
@@ -155,7 +180,12 @@ class TypedSimulation : public Simulation {
   std::unique_ptr<effects::Executor<T>> executor_;
   std::vector<std::unique_ptr<effects::Stage<T>>> stages_;
   std::optional<effects::Grooming<T>> grooming_;
-  std::vector<Pose> before_, now_;  // root poses at the substep's start and end
+  std::vector<Pose> before_, now_;         // root poses at the substep's start and end
+  std::optional<SubstepControl> control_;  // where the scene leaves the substeps to it
+  std::function<void(const std::string&, int, int, state::Snapshot&)> probe_;
+  effects::FrameReport report_;  // of the frame that is stepped, and the seconds of its stages
+  StageSeconds seconds_;
+  std::int64_t launches_ = 0;  // that the roots were moved by, and those of executors that are no more
   Plan plan_;
 };
 
@@ -169,28 +199,32 @@ void TypedSimulation<T>::add_hair_stages(const scene::HairHair& hair_hair) {
 
 template <class T>
 void TypedSimulation<T>::make_plan() {
+  const SubstepControl* control = control_ ? &*control_ : nullptr;
+  plan_ = frames_planned(scene_, control);
   plan_.strands = static_cast<std::int64_t>(roots_.strands());
   plan_.particles = std::accumulate(world_.living.begin(), world_.living.end(), std::int64_t{0});
-  plan_.substeps = scene_.model.substeps;
-  plan_.frames = scene_.frames.last - scene_.frames.first + scene_.frames.preroll;
-  const std::int64_t substeps = static_cast<std::int64_t>(plan_.frames) * plan_.substeps;
   const auto add = [&](const char* name, const char* what) {
-    PlannedStage planned{name, what, false, 0, 0};
+    PlannedStage planned{name, what, false, 0, {0, 0}};
     for (const auto& stage : stages_) {
-      if (stage->name() != name) continue;
-      planned = {name, what, true, stage->bytes(), plan_.frames * stage->launches()};
+      if (std::string_view(stage->name()) != name) continue;
+      const auto of_frame = [&](int substeps) { return stage->launches(substeps); };
+      planned = {name, what, true, stage->bytes(), launches_of_run(plan_, control, of_frame)};
     }
     plan_.stages.push_back(planned);
   };
+  const auto of_roots = [&](int substeps) {
+    return roots_.still() ? effects::Launches{0, 0} : effects::Launches{substeps, substeps};
+  };
   plan_.stages.push_back({"roots", "root frames carried by the head", true,
-                          (before_.size() + now_.size()) * sizeof(Pose), roots_.still() ? 0 : substeps});
+                          (before_.size() + now_.size()) * sizeof(Pose),
+                          launches_of_run(plan_, control, of_roots)});
   add("wind", "mean wind, gusts, turbulence, shelter");
   add("strands", "the strand model: forces, implicit step, lengths");
   add("grid", "hair keeps its volume: density, pressure, friction");
   add("contacts", "hair against hair: segments touch, Coulomb friction");
   add("solids", "collision with level sets, friction");
   const auto add_host = [&](const char* name, const char* what, bool runs, std::size_t bytes) {
-    plan_.stages.push_back({name, what, runs, runs ? bytes : 0, 0});  // no kernels of the device
+    plan_.stages.push_back({name, what, runs, runs ? bytes : 0, {0, 0}});  // no kernels of the device
   };
   add_host("grooming", "trim, lengthen, comb, rest at their frames", grooming_.has_value(),
            grooming_ ? grooming_->bytes() : 0);
@@ -217,6 +251,7 @@ void TypedSimulation<T>::move_roots(double time) {
     state::set_root_motion(state_, model_.layout, strand, before_[strand], now_[strand]);
   });
   executor_->submit_roots(state_);
+  ++launches_;
 }
 
 template <class T>
@@ -251,75 +286,164 @@ void TypedSimulation<T>::rehearse_first_frame() {
 }
 
 template <class T>
-void TypedSimulation<T>::step_frame(int frame, effects::FrameReport& report, StageSeconds& seconds) {
-  const int substeps = scene_.model.substeps;
-  const bool still = roots_.still();
-  const double step = 1.0 / (scene_.frames.fps * substeps);
-  seconds.assign(1, {"roots", 0.0});
-  for (const auto& stage : stages_) seconds.emplace_back(stage->name(), 0.0);
-  if (grooming_) seconds.emplace_back("grooming", 0.0);
-  if (world_.interpolated) seconds.emplace_back("interpolation", 0.0);
-  for (int s = 0; s < substeps; ++s) {
-    const effects::Substep substep{frame,  time_of(frame - 1, s), time_of(frame - 1, s + 1), step,
-                                   s == 0, s + 1 == substeps};
-    for (const auto& stage : stages_) stage->begin(*executor_, substep);
-    Timer timer;
-    if (!still) move_roots(substep.time);
-    seconds[0].second += timer.seconds();
-    for (std::size_t k = 0; k < stages_.size(); ++k) {
-      const Timer stage_timer;
-      stages_[k]->run(*executor_, substep, report);
-      seconds[k + 1].second += stage_timer.seconds();
-      check(*stages_[k], frame);
+template <class Work>
+void TypedSimulation<T>::timed(const char* name, const Work& work) {
+  const Timer timer;
+  trace::Span span(name, "stage");
+  const std::int64_t before = launches();
+  work();
+  if (span.recorded()) {
+    span.tell("launches", static_cast<double>(launches() - before));
+    for (const PlannedStage& stage : plan_.stages)
+      if (stage.name == name) span.tell("bytes", static_cast<double>(stage.bytes));
+  }
+  for (auto& [stage, spent] : seconds_)
+    if (stage == name) spent += timer.seconds();
+}
+
+template <class T>
+void TypedSimulation<T>::step_frame(int frame) {
+  seconds_.clear();
+  for (const PlannedStage& stage : plan_.stages)
+    if (stage.runs) seconds_.emplace_back(stage.name, 0.0);
+  if (control_)
+    take_chosen(frame);
+  else
+    take_frame(frame, scene_.model.substeps);
+}
+
+// From the same start as often as it takes. What a stage remembers from frame to frame, it has in a
+// checkpoint; the roots are where they were.
+template <class T>
+void TypedSimulation<T>::take_chosen(int frame) {
+  const state::StrandState<T> start = state_;
+  const std::vector<Pose> roots = now_;
+  state::Snapshot remembered;
+  for (const auto& stage : stages_) stage->save(remembered);
+  bool again = false;
+  const double living = std::accumulate(model_.count.begin(), model_.count.end(), 0.0);
+  control_->step(frame, living, [&](int substeps) {
+    if (again) {
+      state_ = start, now_ = roots;
+      executor_->submit(state_);
+      executor_->submit_roots(state_);
+      for (const auto& stage : stages_) stage->restore(remembered);
     }
+    again = true;
+    take_frame(frame, substeps);
+    executor_->fetch(state_);
+    return std::vector<double>(state_.position.begin(), state_.position.end());
+  });
+}
+
+template <class T>
+void TypedSimulation<T>::take_frame(int frame, int substeps) {
+  report_ = empty_report(roots_.strands());
+  const double step = 1.0 / (scene_.frames.fps * substeps);
+  for (int s = 0; s < substeps; ++s)
+    take_substep({frame, time_of(frame - 1, s, substeps), time_of(frame - 1, s + 1, substeps), step, s == 0,
+                  s + 1 == substeps, substeps},
+                 s);
+}
+
+template <class T>
+void TypedSimulation<T>::take_substep(const effects::Substep& substep, int number) {
+  trace::Span span("substep");
+  span.tell("frame", substep.frame), span.tell("substep", number), span.tell("time", substep.time);
+  for (const auto& stage : stages_) stage->begin(*executor_, substep);
+  timed("roots", [&] {
+    if (!roots_.still()) move_roots(substep.time);
+  });
+  if (!roots_.still()) probe("roots", substep.frame, number);
+  if (!roots_.still() && !finite_roots(state_)) check_fetched("roots", substep.frame);
+  for (const auto& stage : stages_) {
+    timed(stage->name(), [&] { stage->run(*executor_, substep, report_); });
+    probe(stage->name(), substep.frame, number);
+    check(stage->name(), substep.frame, stage->diverged_strand());
   }
 }
 
 template <class T>
-void TypedSimulation<T>::check(const effects::Stage<T>& stage, int frame) {
-  const std::int64_t strand = stage.diverged_strand();
-  if (strand < 0) return;
+void TypedSimulation<T>::probe(const char* stage, int frame, int substep) {
+  if (!probe_) return;
   executor_->fetch(state_);
-  // The particle: the first that is not finite, else the fastest.
+  state::Snapshot arrays = save(frame, model_, state_, Arrays::kAll);
+  probe_(stage, frame, substep, arrays);
+  restore(arrays, model_, state_, Arrays::kAll);
+  executor_->submit(state_);
+  executor_->submit_roots(state_);
+}
+
+// After a stage: a value that is not finite in any array, or a strand that the stage found diverged.
+template <class T>
+void TypedSimulation<T>::check(const char* stage, int frame, std::int64_t diverged) {
+  if (diverged < 0 && (!on_host() || finite(state_))) return;
+  executor_->fetch(state_);
+  check_fetched(stage, frame);
+  if (diverged >= 0) tell_limits(stage, frame, diverged);
+}
+
+template <class T>
+void TypedSimulation<T>::check_fetched(const char* stage, int frame) {
+  if (const auto fault = find_fault(model_, state_)) tell_fault(stage, frame, *fault);
+}
+
+template <class T>
+void TypedSimulation<T>::tell_fault(const char* stage, int frame, const Fault& fault) {
+  const std::int64_t told = strand_in_cache(world_, fault.strand);
+  throw Diverged(frame_now(frame), stage, told, fault.particle,
+                 fmt::format("the simulation diverged in stage `{}`, strand {}, particle {}: a value is not "
+                             "finite, of `{}`",
+                             stage, told, fault.particle, fault.array));
+}
+
+// The particle: the fastest.
+template <class T>
+void TypedSimulation<T>::tell_limits(const char* stage, int frame, std::int64_t strand) {
   const state::StrandLayout& layout = model_.layout;
   std::int64_t particle = 0;
   double fastest = -1;
-  bool finite = true;
-  for (int i = 0; i < layout.count(strand) && finite; ++i) {
+  for (int i = 0; i < layout.count(strand); ++i) {
     double speed2 = 0;
     for (int c = 0; c < 3; ++c) {
       const double v = state_.velocity[layout.at(strand, i, 3, c)];
-      finite = finite && std::isfinite(v) && std::isfinite(state_.position[layout.at(strand, i, 3, c)]);
       speed2 += v * v;
     }
-    if (!finite || speed2 > fastest) fastest = speed2, particle = i;
+    if (speed2 > fastest) fastest = speed2, particle = i;
   }
-  const std::string how =
-      finite ? fmt::format(
-                   "beyond the limits on edge strain ({}) or speed ({} m/s); fastest particle "
-                   "{:.3g} m/s",
-                   scene_.limits.edge_strain, scene_.limits.speed, std::sqrt(fastest))
-             : std::string("a value is not finite");
   const std::int64_t told = strand_in_cache(world_, strand);
-  throw Diverged(frame_now(frame), stage.name(), told, particle,
-                 fmt::format("the simulation diverged in stage `{}`, strand {}, particle {}: {}",
-                             stage.name(), told, particle, how));
+  throw Diverged(
+      frame_now(frame), stage, told, particle,
+      fmt::format("the simulation diverged in stage `{}`, strand {}, particle {}: beyond the limits on "
+                  "edge strain ({}) or speed ({} m/s); fastest particle {:.3g} m/s",
+                  stage, told, particle, scene_.limits.edge_strain, scene_.limits.speed, std::sqrt(fastest)));
+}
+
+template <class T>
+state::Snapshot TypedSimulation<T>::snapshot(int frame) {
+  state::Snapshot snapshot = save(frame, model_, state_, kept());
+  for (const auto& stage : stages_) stage->save(snapshot);
+  if (control_) control_->save(snapshot);
+  return snapshot;
 }
 
 template <class T>
 void TypedSimulation<T>::resume(const state::Snapshot& snapshot) {
-  restore(snapshot, model_, state_, grooming_.has_value());
-  roots_.pose(time_of(snapshot.frame, 0), now_);
+  restore(snapshot, model_, state_, kept());
+  if (control_) control_->restore(snapshot);
+  roots_.pose(time_of(snapshot.frame), now_);
   for (std::size_t s = 0; s < now_.size(); ++s) set_root_motion(state_, model_.layout, s, now_[s], now_[s]);
   if (grooming_) renew_executor();
   tell_rest();
   for (const auto& stage : stages_) stage->restore(snapshot);
   executor_->submit(state_);
+  check_fetched("resume", snapshot.frame);
 }
 
 // The strands have changed under the executor. The old one goes first: a device need not hold both.
 template <class T>
 void TypedSimulation<T>::renew_executor() {
+  launches_ += executor_->launches();
   executor_.reset();
   executor_ = make_executor(model_, options_);
 }
@@ -331,28 +455,26 @@ void TypedSimulation<T>::groom(int frame) {
   tell_rest();
   executor_->submit(state_);
   executor_->submit_roots(state_);
+  check_fetched("grooming", frame);
+}
+
+template <class T>
+void TypedSimulation<T>::hand_on(int frame, state::Frame out, double spent, state::FrameSink& sink) {
+  const trace::Span span("hand on");
+  state::Figures solver = figures_of(report_, plan_.strands * substeps(), scene_.effects.hair_hair);
+  if (control_) {
+    const state::Figures chosen = control_->figures();
+    solver.insert(solver.end(), chosen.begin(), chosen.end());
+  }
+  out.figures.insert(out.figures.begin(), solver.begin(), solver.end());
+  sink.write(std::move(out), snapshot(frame), spent);
 }
 
 template <class T>
 bool TypedSimulation<T>::run(const FrameRange& range, state::FrameSink& sink, const RunControl& control) {
   int frame = scene_.frames.first - scene_.frames.preroll;
-  effects::FrameReport report = empty_report(roots_.strands());
-  StageSeconds seconds;
-  const std::int64_t strand_steps = plan_.strands * plan_.substeps;
-  const auto hand_on = [&](state::Frame out, double spent) {
-    const state::Figures solver = figures_of(report, strand_steps, scene_.effects.hair_hair);
-    out.figures.insert(out.figures.begin(), solver.begin(), solver.end());
-    state::Snapshot snapshot = save(frame, model_, state_, grooming_.has_value());
-    for (const auto& stage : stages_) stage->save(snapshot);
-    sink.write(std::move(out), std::move(snapshot), spent);
-  };
-  // Counted where the plan has such a stage.
-  const auto timed = [&](const char* name, const auto& work) {
-    const Timer timer;
-    work();
-    for (auto& [stage, spent] : seconds)
-      if (stage == name) spent += timer.seconds();
-  };
+  report_ = empty_report(roots_.strands());
+  probe_ = control.probe;
   start();
   if (control.resume) {
     frame = control.resume->frame;
@@ -360,29 +482,38 @@ bool TypedSimulation<T>::run(const FrameRange& range, state::FrameSink& sink, co
   } else {
     tell_rest();
     groom(frame);
-    if (frame >= range.first) hand_on(frame_now(frame), 0);
+    if (frame >= range.first) hand_on(frame, frame_now(frame), 0, sink);
   }
   if (roots_.still()) move_roots(first_time(scene_.frames));  // once: nothing turns, nothing moves
   bool swept = false;
   while (frame < range.last) {
     if (control.stop && *control.stop) return false;
     const Timer timer;
+    trace::Span span("frame");
     ++frame;
-    report = empty_report(roots_.strands());
-    step_frame(frame, report, seconds);
+    span.tell("frame", frame);
+    step_frame(frame);
     executor_->fetch(state_);
-    timed("grooming", [&] { groom(frame); });
+    if (!on_host() && !finite(state_)) check_fetched("fetch", frame);
+    if (grooming_) timed("grooming", [&] { groom(frame); });
     state::Frame out;
-    if (frame >= range.first) timed("interpolation", [&] { out = frame_now(frame); });
+    if (frame >= range.first) {
+      if (world_.interpolated)
+        timed("interpolation", [&] { out = frame_now(frame); });
+      else
+        out = frame_now(frame);
+    }
     const double spent = timer.seconds();
-    if (report.swept > 0 && !swept)
+    span.tell("substeps", substeps());
+    if (report_.swept > 0 && !swept)
       log_info(fmt::format(
           "frame {}: particles move farther in a substep than the level set's band is wide; their "
           "way is searched for solids (more substeps would resolve it better)",
           frame));
-    swept = swept || report.swept > 0;
-    if (frame >= range.first) hand_on(std::move(out), spent);
-    if (control.on_frame) control.on_frame(frame, spent, seconds);
+    swept = swept || report_.swept > 0;
+    if (frame >= range.first) hand_on(frame, std::move(out), spent, sink);
+    if (control.on_frame) control.on_frame(frame, spent, seconds_);
+    trace::flush();
   }
   sink.finish();
   return true;

@@ -44,6 +44,9 @@ struct RunControl {
   const std::atomic<int>* stop = nullptr;  // non-zero: end after the frame in flight
   std::function<void(int frame, double seconds, const StageSeconds&)>
       on_frame;  // after each stepped frame, preroll too
+  // For tests: sees and may change the arrays of the state by name, as each stage has left them and before
+  // they are looked at (a hair mesh's: as they are at each substep's start). Empty: nothing is copied.
+  std::function<void(const std::string& stage, int frame, int substep, state::Snapshot& arrays)> probe;
 };
 
 class Simulation {

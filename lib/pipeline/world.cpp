@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "core/log.h"
+#include "core/trace.h"
 #include "effects/solids/penetration.h"
 #include "groom/closest_triangle.h"
 #include "groom/edit.h"
@@ -17,9 +18,18 @@ namespace ringlet::pipeline {
 
 double first_time(const scene::Frames& frames) { return -frames.preroll / frames.fps; }
 
-double time_of(const scene::Scene& scene, int frame, int substep) {
-  const double n = static_cast<double>(frame - scene.frames.first) * scene.model.substeps + substep;
-  return n / (scene.frames.fps * scene.model.substeps);
+double time_of(const scene::Frames& frames, int frame, int substep, int substeps) {
+  if (substep % substeps == 0) return (frame - frames.first + substep / substeps) / frames.fps;
+  return (static_cast<double>(frame - frames.first) * substeps + substep) / (frames.fps * substeps);
+}
+
+double mean_length(const World& world) {
+  const groom::Strands& strands = world.simulated.strands;
+  double sum = 0;
+  for (std::size_t s = 0; s < strands.size(); ++s)
+    for (auto i = strands.offsets[s] + 1; i < strands.offsets[s + 1]; ++i)
+      sum += (strands.points[i] - strands.points[i - 1]).norm();
+  return sum / static_cast<double>(strands.size());
 }
 
 groom::Scalp scalp_of(const solids::AnimatedMesh& head) {
@@ -264,6 +274,8 @@ groom::Strands strands_of(const scene::Scene& scene, const scene::Groom& desc, c
 
 void build_groom(const scene::Scene& scene, std::size_t index, bool scales_stiffness, World& world) {
   const scene::Groom& desc = scene.grooms[index];
+  trace::Span span("groom", "set-up");
+  span.tell("name", desc.name);
   const std::optional<groom::Scalp> scalp =
       world.head ? std::optional<groom::Scalp>(scalp_of(*world.head)) : std::nullopt;
   Held held{strands_of(scene, desc, scalp ? &*scalp : nullptr, world), std::nullopt, {}, {}};
@@ -307,6 +319,7 @@ int most_neighbours(const scene::Scene& scene) {
 }  // namespace
 
 World build_world(const scene::Scene& scene) {
+  const trace::Span span("world", "set-up");
   World world;
   if (scene.head) world.head = std::make_unique<solids::AnimatedMesh>(*scene.head, scene.units, scene.frames);
   build_solids(scene, world);

@@ -64,8 +64,11 @@ groom::Scalp scalp_of(const solids::AnimatedMesh& head);
 // The run's first time: minus the preroll [s].
 double first_time(const scene::Frames& frames);
 
-// When substep `substep` on the way from `frame` to the next begins [s]. Quotients of integers: the same bits
-// however a run got there.
-double time_of(const scene::Scene& scene, int frame, int substep);
+// When substep `substep` of `substeps` on the way from `frame` to the next begins [s]. Quotients of integers:
+// the same bits however a run got there.
+double time_of(const scene::Frames& frames, int frame, int substep = 0, int substeps = 1);
+
+// The simulated strands' mean length at rest [m].
+double mean_length(const World& world);
 
 }  // namespace ringlet::pipeline

@@ -211,7 +211,10 @@ class Builder {
     model.stiffness = {stiffness["edge"], stiffness["bend"], stiffness["twist"], stiffness["integrity"],
                        stiffness["angular"]};
     model.particle_mass = block["particle_mass"];
-    model.substeps = block["substeps"];
+    const Json& substeps = block["substeps"];
+    if (substeps.is_object())
+      model.substep_choice = {substeps["tolerance"], substeps["min"], substeps["max"]};
+    model.substeps = substeps.is_object() ? substeps["max"] : substeps;
     model.drag = block["drag"];
     model.clamped_particles = block["clamped_particles"];
     model.preload = block["preload"];

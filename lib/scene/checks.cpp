@@ -59,6 +59,7 @@ class Checks {
     keys("/motion", document_["motion"]);
     if (has_head()) keys("/head/animation", document_["head"]["animation"]);
     for (const auto& [pointer, groom] : grooms_of(document_)) check_groom(pointer, *groom);
+    substeps();
     hair_mesh_model();
     non_hookean();
     wind();
@@ -130,6 +131,12 @@ class Checks {
     if (count == density)
       add(pointer + "/hair_mesh", count ? "both strands and density" : "neither strands nor density above 0",
           "one of them");
+  }
+
+  void substeps() {
+    const Json& substeps = document_["model"]["substeps"];
+    if (substeps.is_object() && substeps["min"] > substeps["max"])
+      add("/model/substeps/min", brief(substeps["min"]), "at most max, " + brief(substeps["max"]));
   }
 
   // What the model hair_mesh cannot do is told, not passed over.

@@ -192,12 +192,19 @@ struct HairMeshModel {
   std::vector<Ellipsoid> ellipsoids;
 };
 
+// How many substeps a frame takes where the run chooses them (pipeline/substep_control.h).
+struct SubstepChoice {
+  double tolerance;  // RMS error of position that a frame may add, over the strands' mean length [-]
+  int min, max;      // substeps of a frame
+};
+
 struct Model {
   ModelType type;
   Scheme scheme;
   Stiffness stiffness;
   double particle_mass;  // [-] enters only forces that do not scale with mass
-  int substeps;
+  int substeps;          // of a frame; the most of one where `substep_choice` is given
+  std::optional<SubstepChoice> substep_choice;
   double drag;            // [1/s] diagonal drag G / m
   int clamped_particles;  // 1 hinged, 2 tangent clamped
   bool preload;

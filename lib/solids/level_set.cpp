@@ -14,8 +14,10 @@
 #include <algorithm>
 #include <functional>
 #include <memory>
+#include <mutex>
 
 #include "core/error.h"
+#include "core/trace.h"
 #include "solids/closest_triangle.h"
 #include "solids/surface_side.h"
 
@@ -249,13 +251,26 @@ std::size_t LevelSet::bytes() const {
          triangle.size() * sizeof triangle[0];
 }
 
+namespace {
+
+// OpenVDB registers its types when the first level set is asked for: a run without solids never gets here.
+void open_openvdb() {
+  static std::once_flag once;
+  std::call_once(once, [] {
+    const trace::Span span("OpenVDB", "set-up");
+    openvdb::initialize();
+  });
+}
+
+}  // namespace
+
 bool LevelSet::encloses_volume() const {
   return std::any_of(distance.begin(), distance.end(), [](float d) { return d < 0; });
 }
 
 LevelSet build_level_set(const ClosedSurface& surface, std::span<const Eigen::Vector3f> vertices,
                          float voxel_size, int half_width) {
-  openvdb::initialize();
+  open_openvdb();
   std::vector<Vec3> points;
   points.reserve(vertices.size());
   for (const Eigen::Vector3f& v : vertices)
@@ -369,7 +384,7 @@ LevelSet from_grids(const FloatGrid& distance, const Int32Grid& triangle, std::s
 }  // namespace
 
 void write_level_set(const std::filesystem::path& file, const LevelSet& level_set) {
-  openvdb::initialize();
+  open_openvdb();
   try {
     openvdb::io::File out(file.string());
     out.write(to_grids(level_set));
@@ -380,7 +395,7 @@ void write_level_set(const std::filesystem::path& file, const LevelSet& level_se
 }
 
 LevelSet read_level_set(const std::filesystem::path& file, std::size_t triangle_count) {
-  openvdb::initialize();
+  open_openvdb();
   try {
     openvdb::io::File in(file.string());
     in.open(false);

@@ -11,6 +11,7 @@
 
 #include "core/error.h"
 #include "core/log.h"
+#include "core/trace.h"
 
 namespace ringlet::solids {
 namespace {
@@ -119,6 +120,8 @@ std::string content_key(const ClosedSurface& surface, std::span<const Eigen::Vec
 std::shared_ptr<const LevelSet> cached_level_set(const ClosedSurface& surface,
                                                  std::span<const Eigen::Vector3f> vertices,
                                                  const LevelSetOptions& options) {
+  trace::Span span("level set", "set-up");
+  span.tell("solid", options.name);
   const auto build = [&] {
     return std::make_shared<const LevelSet>(
         build_level_set(surface, vertices, options.voxel_size, options.half_width));

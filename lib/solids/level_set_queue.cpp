@@ -3,6 +3,8 @@
 #include <limits>
 #include <set>
 
+#include "core/trace.h"
+
 namespace ringlet::solids {
 namespace {
 constexpr int kAhead = 2;  // frames built beyond the pair in use
@@ -30,6 +32,7 @@ int LevelSetQueue::next_wanted() const {
 }
 
 void LevelSetQueue::work() {
+  trace::name_thread("level sets");
   std::unique_lock lock(mutex_);
   while (true) {
     wanted_.wait(lock, [this] { return stop_ || next_wanted() != kNone; });

@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "core/log.h"
+#include "core/trace.h"
 #include "solids/bind_pose.h"
 #include "solids/import.h"
 #include "solids/keyframes.h"
@@ -192,8 +193,11 @@ struct AnimatedMesh::Impl {
 };
 
 AnimatedMesh::AnimatedMesh(const scene::MeshDesc& desc, const scene::Units& scene_units,
-                           const scene::Frames& frames)
-    : impl_(std::make_unique<Impl>(desc, scene_units, frames)) {}
+                           const scene::Frames& frames) {
+  trace::Span span("mesh", "set-up");
+  span.tell("file", desc.file.filename().string());
+  impl_ = std::make_unique<Impl>(desc, scene_units, frames);
+}
 AnimatedMesh::~AnimatedMesh() = default;
 AnimatedMesh::AnimatedMesh(AnimatedMesh&&) noexcept = default;
 

@@ -50,11 +50,14 @@ constexpr Case kSchemaCases[] = {
     {R"({"model": {"type": "rods"}})",
      R"(scene#/model/type: found "rods", expected "ams", "mass_spring" or "hair_mesh")"},
     // minimum, maximum, exclusiveMinimum
-    {R"({"model": {"substeps": 0}})", "scene#/model/substeps: found 0, expected an integer from 1 to 1000"},
+    {R"({"model": {"substeps": 0}})",
+     "scene#/model/substeps: found 0, expected an integer from 1 to 1000, or an object"},
     {R"({"model": {"substeps": 1001}})",
-     "scene#/model/substeps: found 1001, expected an integer from 1 to 1000"},
+     "scene#/model/substeps: found 1001, expected an integer from 1 to 1000, or an object"},
+    {R"({"model": {"substeps": {"tolerance": 0}}})",
+     "scene#/model/substeps/tolerance: found 0, expected a number above 0, at most 1"},
     {R"({"model": {"substeps": 18446744073709551617}})",
-     "scene#/model/substeps: found 1.8446744073709552e+19, expected an integer from 1 to 1000"},
+     "scene#/model/substeps: found 1.8446744073709552e+19, expected an integer from 1 to 1000, or an object"},
     {R"({"model": {"drag": -1}})", "scene#/model/drag: found -1, expected a number from 0 to 1e+06 [1/s]"},
     {R"({"cache": {"error": 0}})", "scene#/cache/error: found 0, expected a number above 0 [units.length]"},
     // pattern, minLength, maxLength
@@ -165,6 +168,8 @@ constexpr Case kMeaningCases[] = {
      "scene#/groom/stiffness/0/curve/1/0: found 1.5, expected a position from 0 (root) to 1 (tip)"},
     {R"({"groom": [{"file": "a.hair", "attach": "fixed"}, {"file": "b.hair", "name": "a", "attach": "fixed"}]})",
      R"(scene#/groom/1/name: found "a", expected a name other than that of /groom/0)"},
+    {R"({"model": {"substeps": {"min": 9, "max": 8}}})",
+     "scene#/model/substeps/min: found 9, expected at most max, 8"},
     // non-Hookean integrity
     {R"({"model": {"type": "mass_spring"}, "effects": {"non_hookean": {}}})",
      R"(scene#/effects/non_hookean: found softening with model "mass_spring", expected model "ams" (only its integrity coupling softens))"},
@@ -311,6 +316,7 @@ TEST_F(BadScene, NeedsAFileThatCanBeRead) {
 // A value of none of the types that the schema knows for it.
 Json of_wrong_type(const Json& value) {
   if (value.is_structured()) return true;
+  if (value.is_number()) return "wrong";
   return Json::parse(R"({"wrong": 1})");
 }
 

@@ -44,7 +44,7 @@ struct Hair {
   FrameReport report;
 };
 
-constexpr Substep kMiddle{2, 0, 0.01, 0.01, false, false}, kLast{2, 0, 0.01, 0.01, false, true};
+constexpr Substep kMiddle{2, 0, 0.01, 0.01, false, false, 4}, kLast{2, 0, 0.01, 0.01, false, true, 4};
 
 TEST(Radius, IsThatOfEveryParticleAndTakesNothingWhereNothingAsks) {
   state::StrandInput input = straight_strands();

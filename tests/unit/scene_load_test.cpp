@@ -30,6 +30,7 @@ TEST_F(SceneLoad, TakesEveryValueOver) {
   EXPECT_EQ(s.model.stiffness.angular, 20);
   EXPECT_EQ(s.model.particle_mass, 2);
   EXPECT_EQ(s.model.substeps, 4);
+  EXPECT_FALSE(s.model.substep_choice);
   EXPECT_EQ(s.model.drag, 0.5);
   EXPECT_EQ(s.model.clamped_particles, 2);
   EXPECT_FALSE(s.model.preload);
@@ -54,7 +55,11 @@ TEST_F(SceneLoad, ReadsHairMeshes) {
   EXPECT_DOUBLE_EQ(strands.noise, 0.0025);
   EXPECT_DOUBLE_EQ(s.grooms[0].width, 1e-4);
   const HairMeshModel& model = *s.model.hair_mesh;
-  EXPECT_EQ(s.model.substeps, 2);
+  ASSERT_TRUE(s.model.substep_choice);
+  EXPECT_EQ(s.model.substep_choice->tolerance, 1e-3);
+  EXPECT_EQ(s.model.substep_choice->min, 2);
+  EXPECT_EQ(s.model.substep_choice->max, 8);
+  EXPECT_EQ(s.model.substeps, 8);
   EXPECT_EQ(model.density, 90);
   EXPECT_EQ(model.stretch, 1e4);
   EXPECT_EQ(model.stretch_across, 200);

@@ -270,6 +270,13 @@ TEST_F(SceneSchema, FillsInExactlyTheSchemasDefaults) {
     }
   };
   test(resolved, {std::begin(cases), std::end(cases)});
+  const Scene chosen = load_json(minimal(), {"/model/substeps={}"});
+  const SubstepChoice& choice = *chosen.model.substep_choice;
+  const std::string of_choice = defs + "substep_choice/properties/";
+  test(Json::parse(chosen.resolved),
+       {{of_choice + "tolerance", "/model/substeps/tolerance", choice.tolerance},
+        {of_choice + "min", "/model/substeps/min", choice.min},
+        {of_choice + "max", "/model/substeps/max", choice.max}});
   const Scene mesh = load_json(minimal_hair_mesh());
   test(Json::parse(mesh.resolved), hair_mesh_defaults(mesh));
   for (const char* name : {"geometric_stiffness", "material_damping", "angular_tangent", "integrity_tangent"})

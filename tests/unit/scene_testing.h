@@ -70,7 +70,7 @@ class SceneTest : public testing::Test {
       "groom": {"name": "long", "hair_mesh": {"file": "a.hair", "strands": 0, "density": 5e4, "particles": 9, "seed": 3,
                 "curl_radius": 0.5, "curl_turns": 3, "noise": 0.25, "noise_waves": 2}, "width": 0.01},
       "model": {
-        "type": "hair_mesh", "substeps": 2,
+        "type": "hair_mesh", "substeps": {"tolerance": 1e-3, "min": 2, "max": 8},
         "hair_mesh": {"density": 90, "stretch": 1e4, "stretch_across": 200, "shear": 300, "horizontal": 400, "bend": 0.1,
           "bend_across": 0.2, "volume": 500, "damping": 0.01, "drag": 0.75, "residual": 1e-5, "max_iterations": 50,
           "deformation_minimisation": false, "start": "collapsed",

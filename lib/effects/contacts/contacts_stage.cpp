@@ -25,15 +25,14 @@ class ContactsStage : public Stage<T> {
         start_root_points_(state.root_points.size()),
         lengths_(scene, model, state) {}
 
-  std::string name() const override { return "contacts"; }
+  const char* name() const override { return "contacts"; }
   std::size_t bytes() const override {
     return contacts_->bytes() + lengths_.bytes() + start_.size() * sizeof(T) +
            start_root_points_.size() * sizeof(double);
   }
-  // Of the device, which only holds the lengths.
-  std::int64_t launches() const override {
-    if (!scene_.effects.inextensible) return 0;
-    return static_cast<std::int64_t>(options_.passes) * (each_substep() ? scene_.model.substeps : 1);
+  // Of the lengths, which are looked at after every pass that found contacts.
+  Launches launches(int substeps) const override {
+    return {0, static_cast<std::int64_t>(options_.passes) * (each_substep() ? substeps : 1)};
   }
   std::int64_t diverged_strand() const override { return lengths_.diverged_strand(); }
 
@@ -63,7 +62,7 @@ class ContactsStage : public Stage<T> {
     executor.fetch(state_);
     const kernels::HairContactStep<T> step = contact_step();
     kernels::HairContactFigures figures = contacts_->begin(step);
-    const double seconds = substep.step * (each_substep() ? 1 : scene_.model.substeps);
+    const double seconds = substep.step * (each_substep() ? 1 : substep.substeps);
     std::int64_t contacts = 0;
     for (int pass = 0; pass < options_.passes; ++pass) {
       const std::int64_t found = contacts_->pass(step);
@@ -92,7 +91,7 @@ class ContactsStage : public Stage<T> {
   }
   void restore(const state::Snapshot& snapshot) override {
     const auto found = snapshot.arrays.find(kKept);
-    if (found == snapshot.arrays.end()) return;
+    if (found == snapshot.arrays.end()) return static_cast<void>(contacts_->keep(nullptr, 0));
     std::vector<std::uint64_t> kept(found->second.size() / sizeof(std::uint64_t));
     std::memcpy(kept.data(), found->second.data(), kept.size() * sizeof kept[0]);
     if (found->second.size() % sizeof kept[0] != 0 ||

@@ -29,19 +29,20 @@ class GridStage : public Stage<T> {
     if (options_.shelter) state_.shelter.assign(state_.position.size() / 3, T(1));
   }
 
-  std::string name() const override { return "grid"; }
+  const char* name() const override { return "grid"; }
   std::size_t bytes() const override {
     return grid_->bytes() + lengths_.bytes() + views_.size() * sizeof(kernels::SolidView);
   }
   // Of the lengths: how many the grid has depends on what it finds.
-  std::int64_t launches() const override { return each_substep() ? scene_.model.substeps : 1; }
+  Launches launches(int substeps) const override { return {0, each_substep() ? substeps : 1}; }
   std::int64_t diverged_strand() const override { return diverged_; }
 
   void at_rest(Executor<T>& executor, const state::StrandState<T>& rest) override {
     grid_ = executor.make_hair_grid();  // the executor may be another than before
     const double side = longest_side(model_, rest, moving_axes(model_, rest, 1, 1));
     cell_ = side > 0 ? side / options_.resolution : 1;
-    kernels::GridStep<T> step = step_of(1 / (scene_.frames.fps * scene_.model.substeps));
+    kernels::GridStep<T> step =
+        step_of(1 / (scene_.frames.fps * scene_.model.substeps), scene_.model.substeps);
     step.axes = moving_axes(model_, rest, cell_, step.substep);
     state::StrandState<T> posed = rest;  // only read
     step.state = posed.view();
@@ -55,7 +56,7 @@ class GridStage : public Stage<T> {
     if (!substep.last_of_frame && !each_substep()) return;
     for (std::size_t k = 0; k < solids_.size(); ++k)
       views_[k] = solids_[k].at(substep.time_before, substep.time);
-    kernels::GridStep<T> step = step_of(substep.step);
+    kernels::GridStep<T> step = step_of(substep.step, substep.substeps);
     step.axes = moving_axes(model_, state_, cell_, substep.step);
     step.frame = substep.frame;
     const kernels::GridFigures figures = grid_->run(step);
@@ -76,13 +77,13 @@ class GridStage : public Stage<T> {
  private:
   bool each_substep() const { return options_.cadence == scene::Cadence::kSubstep; }
 
-  kernels::GridStep<T> step_of(double substep) {
+  kernels::GridStep<T> step_of(double substep, int substeps) {
     kernels::GridStep<T> step{};
     step.batches = model_.view();
     step.state = state_.view();
     step.root_points = state_.root_points.data();
-    const int runs = each_substep() ? scene_.model.substeps : 1;  // a frame
-    step.interval = substep * scene_.model.substeps / runs;
+    const int runs = each_substep() ? substeps : 1;  // a frame
+    step.interval = substep * substeps / runs;
     step.substep = substep;
     step.pic = static_cast<T>(1 - std::pow(1 - options_.pic, 1.0 / runs));
     step.residual = options_.residual;

@@ -26,13 +26,13 @@ class ContactStage : public Stage<T> {
       skin_[model.layout.at_strand(strand, 1, 0)] = skin.triangles[strand];
   }
 
-  std::string name() const override { return "solids"; }
+  const char* name() const override { return "solids"; }
   std::size_t bytes() const override {
     std::size_t total = skin_.size() * sizeof skin_[0] + figures_.size() * sizeof(T);
     for (const solids::Solid& solid : solids_) total += solid.bytes();
     return total;
   }
-  std::int64_t launches() const override { return scene_.model.substeps; }
+  Launches launches(int substeps) const override { return {substeps, substeps}; }
   std::int64_t diverged_strand() const override { return diverged_; }
 
   void run(Executor<T>& executor, const Substep& substep, FrameReport& report) override {
@@ -53,8 +53,7 @@ class ContactStage : public Stage<T> {
     const bool project = lengths && (lengths->cadence == scene::Cadence::kSubstep || substep.last_of_frame);
     step.length_iterations = project ? lengths->max_iterations : 0;
     step.length_tolerance = project ? static_cast<T>(lengths->tolerance) : T(0);
-    step.skipped_substeps =
-        lengths && lengths->cadence == scene::Cadence::kFrame ? scene_.model.substeps - 1 : 0;
+    step.skipped_substeps = lengths && lengths->cadence == scene::Cadence::kFrame ? substep.substeps - 1 : 0;
     step.strain_limit = static_cast<T>(scene_.limits.edge_strain);
     step.speed_limit = static_cast<T>(scene_.limits.speed);
     step.figures = figures_.data();

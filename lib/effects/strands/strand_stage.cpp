@@ -1,5 +1,6 @@
 #include "effects/strands/strand_stage.h"
 
+#include <Eigen/Core>
 #include <algorithm>
 
 #include "effects/strands/tension_curve.h"
@@ -59,7 +60,6 @@ class StrandStage : public Stage<T> {
         parameters_(strand_parameters<T>(scene)),
         lengths_at_frame_end_(scene.effects.inextensible &&
                               scene.effects.inextensible->cadence == scene::Cadence::kFrame),
-        substeps_(scene.model.substeps),
         air_(drag_law<T>(scene)),
         figures_(static_cast<std::size_t>(model.layout.batches()) * kernels::kFigures * kLanes) {
     if (const auto& softening = scene.effects.non_hookean) {
@@ -69,9 +69,9 @@ class StrandStage : public Stage<T> {
     }
   }
 
-  std::string name() const override { return "strands"; }
+  const char* name() const override { return "strands"; }
   std::size_t bytes() const override { return model_.bytes() + state_.bytes() + figures_.size() * sizeof(T); }
-  std::int64_t launches() const override { return substeps_; }
+  Launches launches(int substeps) const override { return {substeps, substeps}; }
   std::int64_t diverged_strand() const override { return diverged_; }
 
   void run(Executor<T>& executor, const Substep& substep, FrameReport& report) override {
@@ -79,30 +79,41 @@ class StrandStage : public Stage<T> {
                                 figures_.data()};
     step.parameters.step = static_cast<T>(substep.step);
     if (lengths_at_frame_end_ && !substep.last_of_frame) step.parameters.length_iterations = 0;
-    if (lengths_at_frame_end_) step.parameters.skipped_substeps = substeps_ - 1;
+    if (lengths_at_frame_end_) step.parameters.skipped_substeps = substep.substeps - 1;
     step.elongation = elongation_, step.air = air_;
     if (!state_.elongation.empty()) step.elongation.memory = state_.elongation.data();
     if (!state_.air.empty()) step.air.velocity = state_.air.data();
     executor.strand_step(step);
-    gather(report);
+    gather(substep, report);
   }
 
  private:
-  T figure(std::size_t strand, int which) const {
-    return figures_[model_.layout.at_strand(strand, kernels::kFigures, which)];
-  }
+  using Lanes = Eigen::Map<const Eigen::Array<T, kLanes, 1>, Eigen::Aligned64>;
 
-  void gather(FrameReport& report) {
+  // A batch at a time: lanes without a strand have figures of zero.
+  void gather(const Substep& substep, FrameReport& report) {
+    bool diverged = false;
+    for (std::int32_t batch = 0; batch < model_.layout.batches(); ++batch) {
+      const auto figure = [&](int which) {
+        return Lanes(figures_.data() + (batch * std::size_t{kernels::kFigures} + which) * kLanes);
+      };
+      const Lanes iterations = figure(kernels::kIterations);
+      report.length_iterations += static_cast<double>(iterations.sum());  // small integers: exact
+      report.most_length_iterations =
+          std::max(report.most_length_iterations, static_cast<double>(iterations.maxCoeff()));
+      const Lanes pieces = figure(kernels::kSubdivisions);
+      if (pieces.maxCoeff() > T(1)) report.subdivided += static_cast<double>((pieces > T(1)).count());
+      report.speed = std::max(report.speed, static_cast<double>(figure(kernels::kSpeed).maxCoeff()));
+      diverged = diverged || figure(kernels::kDiverged).maxCoeff() > T(0);
+    }
     diverged_ = -1;
+    if (!diverged && !substep.last_of_frame) return;
     for (std::size_t strand = 0; strand < model_.layout.strands(); ++strand) {
-      const double iterations = figure(strand, kernels::kIterations);
-      report.strain[strand] = static_cast<float>(figure(strand, kernels::kStrain));
-      report.length_iterations += iterations;
-      report.most_length_iterations = std::max(report.most_length_iterations, iterations);
-      report.subdivided += figure(strand, kernels::kSubdivisions) > T(1) ? 1 : 0;
-      report.speed = std::max(report.speed, static_cast<double>(figure(strand, kernels::kSpeed)));
-      if (diverged_ < 0 && !(figure(strand, kernels::kDiverged) <= T(0)))
-        diverged_ = static_cast<std::int64_t>(strand);
+      const auto figure = [&](int which) {
+        return figures_[model_.layout.at_strand(strand, kernels::kFigures, which)];
+      };
+      report.strain[strand] = static_cast<float>(figure(kernels::kStrain));
+      if (diverged_ < 0 && figure(kernels::kDiverged) > T(0)) diverged_ = static_cast<std::int64_t>(strand);
     }
   }
 
@@ -110,7 +121,6 @@ class StrandStage : public Stage<T> {
   state::StrandState<T>& state_;
   kernels::StrandParameters<T> parameters_;
   bool lengths_at_frame_end_;
-  int substeps_;  // a frame
   kernels::Elongation<T> elongation_{};
   kernels::Air<T> air_;
   state::AlignedVector<T> figures_;

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "core/random.h"
+#include "core/trace.h"
 
 namespace ringlet::effects {
 namespace {
@@ -33,6 +34,7 @@ double fraction(double turns) { return turns - std::floor(turns); }
 
 WindField::WindField(const scene::Wind& wind, const scene::Frames& frames, const Vec3& origin)
     : origin_(origin) {
+  const trace::Span span("wind field", "set-up");
   for (const scene::WindKey& key : wind.keys)
     knots_.push_back({(key.frame - frames.first) / frames.fps, key.velocity});
   if (wind.gusts) make_gusts(*wind.gusts);

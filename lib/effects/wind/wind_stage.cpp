@@ -14,7 +14,6 @@ class WindStage : public Stage<T> {
       : field_(*scene.effects.wind, scene.frames, origin),
         shelter_(scene.effects.wind->shelter),
         head_(head),
-        substeps_(scene.model.substeps),
         model_(model),
         state_(state) {
     state_.air.assign(state_.position.size(), T(0));
@@ -24,12 +23,12 @@ class WindStage : public Stage<T> {
     head_vertices_.resize(head_->vertex_count());
   }
 
-  std::string name() const override { return "wind"; }
+  const char* name() const override { return "wind"; }
   std::size_t bytes() const override {
     return (state_.air.size() + exposure_.size()) * sizeof(T) + map_.bytes() +
            head_vertices_.size() * sizeof(Vec3);
   }
-  std::int64_t launches() const override { return substeps_ + (shelter_ ? 1 : 0); }
+  Launches launches(int substeps) const override { return {substeps, substeps + (shelter_ ? 1 : 0)}; }
 
   void run(Executor<T>& executor, const Substep& substep, FrameReport&) override {
     if (substep.first_of_frame) sheltered_ = false;
@@ -57,7 +56,6 @@ class WindStage : public Stage<T> {
   WindField field_;
   std::optional<scene::Shelter> shelter_;
   const solids::AnimatedMesh* head_;
-  int substeps_;  // a frame
   const state::StrandModel<T>& model_;
   state::StrandState<T>& state_;
   state::AlignedVector<T> exposure_;  // [rows] or empty

@@ -1,0 +1,67 @@
+// Where a run's time goes, for chrome://tracing and Perfetto: a file in the Trace Event Format (JSON), one
+// event a span of work, on the thread that did it. While nothing is recorded a span costs the reading of a
+// flag.
+#pragma once
+#include <atomic>
+#include <filesystem>
+#include <initializer_list>
+#include <string>
+#include <string_view>
+#include <utility>
+
+namespace ringlet::trace {
+
+namespace internal {
+extern std::atomic<bool> recording;
+}
+
+inline bool on() { return internal::recording.load(std::memory_order_relaxed); }
+
+// Records into a file while it lives; one at a time. Whatever becomes of the program, the file is whole JSON
+// as of the last `flush`.
+class Recording {
+ public:
+  explicit Recording(const std::filesystem::path& file);  // throws Error{kIo}
+  ~Recording();
+  Recording(const Recording&) = delete;
+  Recording& operator=(const Recording&) = delete;
+  void finish();  // throws Error{kIo} where not all of it could be written
+};
+
+// From its construction to its destruction, `category` being what viewers filter by.
+class Span {
+ public:
+  explicit Span(std::string_view name, const char* category = "run") {
+    if (on()) begin(name, category);
+  }
+  ~Span() {
+    if (begun_) end();
+  }
+  Span(const Span&) = delete;
+  Span& operator=(const Span&) = delete;
+
+  // What viewers show beside it. Nothing where nothing is recorded.
+  void tell(std::string_view key, double value);
+  void tell(std::string_view key, std::string_view value);
+  bool recorded() const { return begun_; }
+
+ private:
+  void begin(std::string_view name, const char* category);
+  void end();
+
+  bool begun_ = false;
+  double start_ = 0;  // [us] since the recording began
+  const char* category_ = nullptr;
+  std::string name_, arguments_;
+};
+
+// Values that viewers draw as curves over time.
+void count(std::string_view name, std::initializer_list<std::pair<std::string_view, double>> values);
+
+// Names the calling thread.
+void name_thread(std::string_view name);
+
+// Brings what was recorded so far into the file.
+void flush();
+
+}  // namespace ringlet::trace

@@ -180,7 +180,7 @@ class Picture {
       x += 16 + kCharacter * static_cast<double>(name.size()) + 18;
     };
     if (!study_.product) {
-      entry(kGiven, kGiven, "as given");
+      entry(kGiven, kGiven, kAsGiven);
       for (std::size_t a = 0; a < study_.names.size(); ++a)
         entry(kColours[a % kColours.size()], kColours[a % kColours.size()], study_.names[a]);
     }

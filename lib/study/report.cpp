@@ -59,14 +59,27 @@ class Page {
 
   void head() {
     say("# {}: what accuracy costs\n", study_.scene);
-    say("{} runs, frames {} to {}; times are medians over frames and {} repeats, warmed, on {}.",
+    say("{} runs, frames {} to {}; times are medians over frames and {} repeat{}, warmed, on {}.",
         std::count_if(study_.rows.begin(), study_.rows.end(),
                       [](const Row& r) { return r.status != Status::kNew; }),
-        study_.frames.first, study_.frames.last, study_.repeats, study_.processor);
+        study_.frames.first, study_.frames.last, study_.repeats, study_.repeats == 1 ? "" : "s",
+        study_.processor);
     say("{}", study_.product ? "Every combination of the values was run."
                              : "One setting at a time is changed, the others stay as the scene has them.");
+    given();
     if (!study_.complete) say("**The study is not complete; `--resume` goes on.**");
     say("\n![Error against time](plot.svg)\n");
+  }
+
+  // What the scene has where a setting is varied.
+  void given() {
+    for (const Row& r : study_.rows) {
+      if (r.label != kAsGiven) continue;
+      std::string settings;
+      for (std::size_t a = 0; a < study_.names.size(); ++a)
+        settings += fmt::format("{}{}={}", a ? ", " : "", study_.names[a], r.columns[a]);
+      say("`as given` is {}.", code(settings));
+    }
   }
 
   void cost() {
@@ -143,7 +156,8 @@ class Page {
     std::string line = fmt::format("| {} | {} ", code(r.label),
                                    r.timed ? fmt::format("{:.4g}", r.timed->milliseconds) : std::string("-"));
     for (const auto& [name, spread] : r.measured.errors.named())
-      line += fmt::format("| {} ({}) ", cell(rms(spread), "{:.2e}"), cell(p99(spread), "{:.2e}"));
+      line += spread ? fmt::format("| {} ({}) ", cell(spread->rms, "{:.2e}"), cell(spread->p99, "{:.2e}"))
+                     : std::string("| - ");
     std::string stages;
     if (r.timed)
       for (const auto& [stage, spent] : r.timed->stages)

@@ -84,7 +84,7 @@ class Maker {
       variant.axis = ++changed == 1 ? static_cast<int>(a) : -1;
       change(axes_[a], value, variant);
     }
-    if (changed == 0) variant.label = "as given";
+    if (changed == 0) variant.label = kAsGiven;
     scene::LoadOptions options{variant.overrides, "--vary"};
     variant.scene = changed == 0 ? scene_ : scene::load(base_.file, options);
     variant.key = key_of(variant);

@@ -9,6 +9,8 @@
 
 namespace ringlet::study {
 
+inline constexpr const char* kAsGiven = "as given";  // the label of the scene as given
+
 // One run's settings.
 struct Variant {
   scene::Scene scene;

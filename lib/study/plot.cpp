@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kWidth = 900, kHeight = 600;
 constexpr double kLeft = 86, kRight = 24, kTop = 56, kBottom = 64;  // margins of the axes
-constexpr double kFont = 12, kCharacter = 6.4;                      // a character's mean width at that size
+constexpr double kFont = 12, kCharacter = 7.2;                      // a character's mean width at that size
 constexpr std::array kColours = {"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"};
 constexpr const char* kGiven = "#222222";  // the scene as given
 
@@ -190,11 +190,27 @@ class Picture {
 
   void front() {
     std::string points;
-    for (const std::size_t row : answers_.front)
-      for (const Mark& mark : marks_)
-        if (mark.row == row) points += fmt::format("{:.1f},{:.1f} ", mark.x, mark.y);
+    const Mark* before = nullptr;
+    for (const std::size_t row : answers_.front) {
+      const auto mark =
+          std::find_if(marks_.begin(), marks_.end(), [&](const Mark& one) { return one.row == row; });
+      if (mark == marks_.end()) continue;
+      points += fmt::format("{:.1f},{:.1f} ", mark->x, mark->y);
+      if (before) keep_clear(*before, *mark);
+      before = &*mark;
+    }
     out_ += fmt::format("<polyline points=\"{}\" fill=\"none\" stroke=\"#777777\" stroke-width=\"1.6\"/>\n",
                         points);
+  }
+
+  // No label on the line between these.
+  void keep_clear(const Mark& from, const Mark& to) {
+    const int pieces = 1 + static_cast<int>(std::hypot(to.x - from.x, to.y - from.y) / 6);
+    for (int k = 0; k <= pieces; ++k) {
+      const double share = static_cast<double>(k) / pieces;
+      const double x = from.x + share * (to.x - from.x), y = from.y + share * (to.y - from.y);
+      taken_.push_back({x - 2, y - 2, x + 2, y + 2});
+    }
   }
 
   void point(const Mark& mark) {

@@ -10,7 +10,7 @@ namespace ringlet::study {
 namespace {
 
 constexpr double kWidth = 900, kHeight = 600;
-constexpr double kLeft = 86, kRight = 24, kTop = 56, kBottom = 64;  // margins of the axes
+constexpr double kLeft = 86, kRight = 24, kTop = 74, kBottom = 64;  // margins of the axes
 constexpr double kFont = 12, kCharacter = 7.2;                      // a character's mean width at that size
 constexpr std::array kColours = {"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"};
 constexpr const char* kGiven = "#222222";  // the scene as given
@@ -171,13 +171,13 @@ class Picture {
   }
 
   void legend() {
-    double x = kLeft;
+    double x = kLeft, y = 44;
     const auto entry = [&](const char* fill, const char* stroke, const std::string& name) {
-      out_ += fmt::format(
-          "<circle cx=\"{:.1f}\" cy=\"42\" r=\"5\" fill=\"{}\" stroke=\"{}\" stroke-width=\"1.6\"/>\n", x + 6,
-          fill, stroke);
-      text(x + 16, 46, "start", name);
-      x += 16 + kCharacter * static_cast<double>(name.size()) + 18;
+      const double width = 16 + kCharacter * static_cast<double>(name.size()) + 18;
+      if (x + width > kWidth - kRight) x = kLeft, y += 18;
+      circle(x + 6, y, 5, fill, stroke);
+      text(x + 16, y + 4, "start", name);
+      x += width;
     };
     if (!study_.product) {
       entry(kGiven, kGiven, kAsGiven);
@@ -213,14 +213,16 @@ class Picture {
     }
   }
 
+  void circle(double x, double y, double radius, const char* fill, const char* stroke) {
+    out_ += fmt::format(
+        "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{}\" fill=\"{}\" stroke=\"{}\" stroke-width=\"1.6\"/>\n", x,
+        y, radius, fill, stroke);
+  }
+
   void point(const Mark& mark) {
     const char* stroke = colour(study_.rows[mark.row]);
-    out_ += fmt::format(
-        "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"5\" fill=\"{}\" stroke=\"{}\" stroke-width=\"1.6\"/>\n",
-        mark.x, mark.y, mark.on_front ? stroke : "white", stroke);
-    if (answers_.knee == mark.row)
-      out_ += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"10\" fill=\"none\" stroke=\"#222222\"/>\n",
-                          mark.x, mark.y);
+    circle(mark.x, mark.y, 5.5, mark.on_front ? stroke : "white", stroke);
+    if (answers_.knee == mark.row) circle(mark.x, mark.y, 10, "none", kGiven);
     taken_.push_back({mark.x - 7, mark.y - 7, mark.x + 7, mark.y + 7});
   }
 

@@ -110,7 +110,7 @@ def test_the_plot_is_a_picture_with_every_run(substeps):
     words = [node.firstChild.data for node in picture.getElementsByTagName("text")]
     assert any("error of positions" in word for word in words) and "time of a frame [ms]" in words
     assert any(word.startswith("substeps=4") for word in words)
-    assert len([c for c in picture.getElementsByTagName("circle") if c.getAttribute("r") == "5" and c.getAttribute("cy") != "42"]) == 4
+    assert len([c for c in picture.getElementsByTagName("circle") if c.getAttribute("r") == "5.5"]) == 4
 
 
 def test_errors_are_what_compare_tells(program, scene, substeps, tmp_path):

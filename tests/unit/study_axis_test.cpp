@@ -95,7 +95,7 @@ TEST_F(StudyVariants, ChangeOneSettingAtATimeAndRunTheSameOnce) {
       << "8, float: as given";
   EXPECT_THAT(variants[0].columns, ElementsAre("8", "float"));
   EXPECT_THAT(variants[1].columns, ElementsAre("4", "float"));
-  EXPECT_EQ(variants[1].scene.model.substeps, 4);
+  EXPECT_EQ(most_substeps(variants[1].scene), 4);
   EXPECT_EQ(variants[1].scene.frames.last, 3) << "--set holds for all";
   EXPECT_THAT(variants[1].options, ElementsAre("--set /model/substeps=4"));
   EXPECT_THAT(variants[2].options, ElementsAre("--precision double"));

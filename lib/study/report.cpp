@@ -95,10 +95,12 @@ class Page {
     for (std::size_t k = 0; k + 1 < answers_.front.size(); ++k) {
       const std::size_t a = answers_.front[k], b = answers_.front[k + 1];
       const Point from = point(a), to = point(b);
-      const auto digit = digit_cost(from, to);
+      // Less than a twentieth of a digit says nothing about a whole one.
+      const bool gains = from.error / to.error > 1.12;
+      const auto digit = gains ? digit_cost(from, to) : std::nullopt;
       say("| {} | {} | {:.3g} times | {:.3g} times | {} |", code(row(a).label), code(row(b).label),
           from.error / to.error, to.milliseconds / from.milliseconds,
-          digit ? fmt::format("{:.3g} times the time", *digit) : std::string("-"));
+          digit ? fmt::format("{:.3g} times the time", *digit) : std::string("hardly a gain"));
     }
     say("");
   }
@@ -110,8 +112,9 @@ class Page {
       if (!answers_.beaten[k]) continue;
       const std::size_t other = *answers_.beaten[k];
       any = true;
-      say("- {}: {} has {:.3g} times less error in {:.0f} % of its time.", code(row(k).label),
-          code(row(other).label), point(k).error / point(other).error,
+      const double gain = point(k).error / point(other).error;
+      say("- {}: {} has {} in {:.0f} % of its time.", code(row(k).label), code(row(other).label),
+          gain > 1.01 ? fmt::format("{:.3g} times less error", gain) : std::string("the same error"),
           100 * point(other).milliseconds / point(k).milliseconds);
     }
     if (!any) say("None: every run is the quickest of its accuracy.");

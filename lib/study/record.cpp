@@ -110,13 +110,13 @@ Out answers_json(const Study& study) {
   return out;
 }
 
-void read_row(const Json& json, Row& row) {
+// `stages`: in the order they run, which `json` has lost.
+void read_row(const Json& json, const Out& stages, Row& row) {
   row.status = json["status"] == "ok" ? Status::kOk : Status::kDiverged;
   row.message = json.value("message", "");
   if (!json["ms_per_frame"].is_null()) {
     Timed& timed = row.timed.emplace();
     timed.milliseconds = json["ms_per_frame"], timed.frames = json["frames_timed"];
-    const Out stages = Out::parse(json["stages_ms"].dump());
     for (const auto& [stage, spent] : stages.items()) timed.stages.emplace_back(stage, spent);
   }
   row.measured.errors = read_errors(json["errors"]);
@@ -232,9 +232,12 @@ int take_over(const std::string& text, const std::string& file, Study& study) {
     if (json.at("format") != "ringlet-study") throw Error(ErrorKind::kInput, file, "is no study");
     if (json.at("identity") != Json::parse(study.identity)) return -1;
     int rows = 0;
-    for (const Json& row : json.at("rows"))
+    const Out ordered = Out::parse(text);
+    for (std::size_t k = 0; k < json.at("rows").size(); ++k) {
+      const Json& row = json["rows"][k];
       for (Row& mine : study.rows)
-        if (mine.key == row.at("key")) read_row(row, mine), ++rows;
+        if (mine.key == row.at("key")) read_row(row, ordered["rows"][k]["stages_ms"], mine), ++rows;
+    }
     read_reference(json.at("reference"), study);
     return rows;
   } catch (const nlohmann::json::exception& error) {

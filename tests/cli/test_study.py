@@ -241,6 +241,7 @@ def test_a_study_that_is_cut_goes_on_with_the_rows_it_has(program, scene, tmp_pa
     process.stdout.read()
     assert process.wait(60) == 128 + signal.SIGINT
     cut = json.loads((out / "study.json").read_text())
+    lines = (out / "study.csv").read_text().splitlines()
     assert not cut["complete"] and 2 <= len(cut["rows"]) < 6
     assert "`--resume` goes on" in (out / "report.md").read_text()
 
@@ -248,6 +249,7 @@ def test_a_study_that_is_cut_goes_on_with_the_rows_it_has(program, scene, tmp_pa
     assert told["complete"] and len(rows) == 6
     assert [row["ms_per_frame"] for row in told["rows"]][: len(cut["rows"])] == [row["ms_per_frame"] for row in cut["rows"]]
     assert told["reference"]["levels"] == cut["reference"]["levels"]
+    assert (out / "study.csv").read_text().splitlines()[: len(cut["rows"]) + 1] == lines
 
     # Of another scene nothing is taken over.
     told, _ = study(program, scene, out, "--resume", *options[:4], "--vary", "/model/substeps=2", "--set", "/effects/gravity=[0,-5,0]")

@@ -8,10 +8,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "core/processor.h"
 #include "core/timer.h"
 #include "effects/executor.h"
 #include "kernels/launch/launch.h"
@@ -21,13 +21,6 @@ namespace ringlet::app {
 namespace {
 
 using Row = nlohmann::ordered_json;
-
-std::string processor() {
-  std::ifstream info("/proc/cpuinfo");
-  for (std::string line; std::getline(info, line);)
-    if (line.starts_with("model name")) return line.substr(line.find(':') + 2);
-  return "unknown processor";
-}
 
 double median(std::vector<double> values) {
   std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
@@ -220,9 +213,9 @@ int run_bench(const BenchOptions& options) {
     for (const std::string& file : options.scenes) rows.push_back(scene_row(file, options));
   }
   if (options.json) {
-    fmt::print("{}\n", Row({{"processor", processor()}, {"cores", cores}, {"rows", rows}}).dump(2));
+    fmt::print("{}\n", Row({{"processor", processor_name()}, {"cores", cores}, {"rows", rows}}).dump(2));
   } else {
-    fmt::print("{}, {} cores\n", processor(), cores);
+    fmt::print("{}, {} cores\n", processor_name(), cores);
     print_table(rows);
   }
   return 0;

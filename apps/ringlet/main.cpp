@@ -13,6 +13,7 @@
 #include "plan.h"
 #include "run.h"
 #include "scene/scene.h"
+#include "study.h"
 
 namespace ringlet::app {
 
@@ -130,6 +131,50 @@ void add_bench(CLI::App& app, Job& job) {
   command->callback([options, &job] { job = [options] { return run_bench(*options); }; });
 }
 
+void add_study(CLI::App& app, const bool& quiet, const bool& verbose, Job& job) {
+  CLI::App* command = app.add_subcommand("study", "what accuracy costs: time and error of settings");
+  const auto options = std::make_shared<StudyOptions>();
+  add_scene(*command, options->scene.file, options->scene.overrides);
+  add_machine(*command, options->scene.options, options->scene.threads);
+  command
+      ->add_option(
+          "--vary", options->vary,
+          "a pointer into the scene, or precision, backend, threads, instruction-set, and its values; "
+          "repeatable; /model/substeps=1,2,4,8,16,32 by default")
+      ->allow_extra_args(false)
+      ->option_text("POINTER=V1,V2,...");
+  command->add_flag("--product", options->product, "every combination, not one setting at a time");
+  command
+      ->add_option("--budget", options->budget,
+                   "print the most accurate settings within this time of a frame")
+      ->option_text("40ms");
+  command->add_option("--target", options->target, "print the quickest settings within this error")
+      ->option_text("1e-3");
+  command
+      ->add_option("--reference", options->reference,
+                   "what the reference has that the scene has not; repeatable")
+      ->allow_extra_args(false)
+      ->option_text("POINTER=JSON");
+  command->add_option("--reference-cap", options->reference_cap, "most substeps of the reference")
+      ->check(CLI::Range(1, 1000))
+      ->option_text("N");
+  command->add_option("-o,--output", options->output, "directory of the study; out/NAME_study by default")
+      ->option_text("DIR");
+  command->add_option("--frames", options->frames, "frames to measure")->option_text("A-B");
+  command->add_option("--repeats", options->repeats, "of each timing; medians are told")
+      ->check(CLI::Range(1, 1000));
+  CLI::Option* resume = command->add_flag("--resume", options->resume, "go on with the runs that are there");
+  command->add_flag("--overwrite", options->overwrite, "replace a study that is there")->excludes(resume);
+  command->add_flag("--json", options->json, "print study.json");
+  command->callback([options, &quiet, &verbose, &job] {
+    job = [options, &quiet, &verbose] {
+      if (!verbose) set_log_level(LogLevel::kWarning);  // every run would tell its choices again
+      options->quiet = quiet;
+      return run_study(*options);
+    };
+  });
+}
+
 // The word of the command line that should be a subcommand and is none; else empty.
 std::string unknown_subcommand(const CLI::App& app, int argc, char** argv) {
   const CLI::App* at = &app;
@@ -164,6 +209,7 @@ int main(int argc, char** argv) {
   add_compare(app, job);
   add_groom(app, job);
   add_bench(app, job);
+  add_study(app, quiet, verbose, job);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

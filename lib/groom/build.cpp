@@ -4,6 +4,7 @@
 
 #include "core/error.h"
 #include "core/log.h"
+#include "groom/edit.h"
 #include "groom/groom.h"
 #include "groom/hair_mesh_strands.h"
 
@@ -49,17 +50,8 @@ HairMeshStrandsDesc strands_desc(const scene::Groom& desc) {
   return {from.strands,     from.density,    from.particles, from.seed,       desc.width,
           from.curl_radius, from.curl_turns, from.noise,     from.noise_waves};
 }
-}  // namespace
-
-HairMesh read_scene_hair_mesh(const scene::Groom& desc, const scene::Units& scene_units) {
-  return read_hair_mesh(desc.hair_mesh->file, desc.units, scene_units);
-}
-
-HairMeshStrands scene_strands(const scene::Groom& desc, const HairMesh& mesh) {
-  return {mesh, strands_desc(desc), desc.pointer + "/hair_mesh"};
-}
-
-Strands build(const scene::Groom& desc, const scene::Units& scene_units, const Scalp* scalp) {
+// As files, growth or a hair mesh have them.
+Strands made(const scene::Groom& desc, const scene::Units& scene_units, const Scalp* scalp) {
   if (desc.grow) return grow_scene_groom(desc, scene_units, scalp);
   if (desc.hair_mesh) return scene_strands(desc, read_scene_hair_mesh(desc, scene_units)).strands();
   std::vector<std::filesystem::path> files = {desc.file.value()};
@@ -78,6 +70,20 @@ Strands build(const scene::Groom& desc, const scene::Units& scene_units, const S
   log_info(fmt::format("groom \"{}\": {} strands, {} particles, {} group(s)", desc.name, all.size(),
                        all.particles(), all.group_names.size()));
   return all;
+}
+}  // namespace
+
+HairMesh read_scene_hair_mesh(const scene::Groom& desc, const scene::Units& scene_units) {
+  return read_hair_mesh(desc.hair_mesh->file, desc.units, scene_units);
+}
+
+HairMeshStrands scene_strands(const scene::Groom& desc, const HairMesh& mesh) {
+  return {mesh, strands_desc(desc), desc.pointer + "/hair_mesh"};
+}
+
+Strands build(const scene::Groom& desc, const scene::Units& scene_units, const Scalp* scalp) {
+  Strands strands = made(desc, scene_units, scalp);
+  return desc.particles ? resample(strands, desc.particles, std::nullopt) : strands;
 }
 
 }  // namespace ringlet::groom

@@ -156,6 +156,7 @@ class Builder {
       groom.stiffness.push_back({scale["group"], scale["coupling"], scale["curve"].get<Curve>()});
     if (block.contains("interpolate"))
       groom.interpolate = interpolate(pointer + "/interpolate", block["interpolate"]);
+    groom.particles = optional<int>(block, "particles");
     groom.pointer = pointer;
     return groom;
   }

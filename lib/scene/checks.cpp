@@ -152,7 +152,7 @@ class Checks {
       if (!groom->contains("hair_mesh"))
         add(pointer, "strands without a hair mesh", "hair_mesh, for the model \"hair_mesh\"",
             "ringlet groom hair-mesh makes one for a head");
-      for (const char* key : {"interpolate", "stiffness"})
+      for (const char* key : {"interpolate", "stiffness", "particles"})
         if (groom->contains(key) && !(*groom)[key].empty())
           add(pointer + pointer_token(key), "a key of simulated strands", "none with model \"hair_mesh\"");
     }

@@ -29,12 +29,12 @@ std::string read_text(const fs::path& file) {
 
 // The scene's text is not to blame for what the command line put in.
 void blame_overrides(const fs::path& file, const std::vector<std::string>& overridden,
-                     std::vector<Problem>& problems) {
+                     const std::string& option, std::vector<Problem>& problems) {
   for (Problem& problem : problems)
     for (const std::string& pointer : overridden) {
       const std::string where = file.string() + "#" + pointer;
       if (problem.where != where && !problem.where.starts_with(where + "/")) continue;
-      problem.hint += (problem.hint.empty() ? "" : "; ") + std::string("given by --set");
+      problem.hint += (problem.hint.empty() ? "" : "; ") + std::string("given by ") + option;
       break;
     }
 }
@@ -67,11 +67,12 @@ Scene load(const fs::path& file, const LoadOptions& options) {
   const Schema schema;
   Json document = parse_json(read_text(file), file.string());
   std::vector<std::string> overridden;
-  for (const std::string& text : options.overrides) overridden.push_back(apply_override(text, document));
+  for (const std::string& text : options.overrides)
+    overridden.push_back(apply_override(text, document, options.option));
 
   const auto refuse_if = [&](std::vector<Problem> problems) {
     if (problems.empty()) return;
-    blame_overrides(file, overridden, problems);
+    blame_overrides(file, overridden, options.option, problems);
     throw Error(ErrorKind::kInput, std::move(problems));
   };
   std::vector<Problem> problems = validate(schema, document, file.string());

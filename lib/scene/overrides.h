@@ -8,8 +8,9 @@ namespace ringlet::scene {
 
 // Applies one override to `document` and returns its JSON pointer. null removes the value (no error where
 // there is none); missing parents are made, as lists where the pointer says `0` or `-`, as objects otherwise;
-// `-` and the index after the last append to a list. Throws Error{kUsage}: no `=`, no JSON pointer, a value
+// `-` and the index after the last append to a list. `option` is what gave it, for
+// messages. Throws Error{kUsage}: no `=`, no JSON pointer, a value
 // that is not JSON, an index beyond the list, a member of what has none.
-std::string apply_override(const std::string& text, Json& document);
+std::string apply_override(const std::string& text, Json& document, const std::string& option = "--set");
 
 }  // namespace ringlet::scene

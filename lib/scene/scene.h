@@ -10,6 +10,7 @@ namespace ringlet::scene {
 
 struct LoadOptions {
   std::vector<std::string> overrides;  // `POINTER=JSON`, applied in order before validation; null removes
+  std::string option = "--set";        // of the command line that gave them, for messages
 };
 
 // Reads, overrides, validates against schemas/scene.schema.json, fills in every default, checks meaning

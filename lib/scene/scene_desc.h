@@ -151,7 +151,8 @@ struct Groom {
   Animation animation;  // attach fixed only
   std::vector<StiffnessScale> stiffness;
   std::optional<Interpolate> interpolate;
-  double width;  // [m] strand diameter where no file gives it
+  std::optional<int> particles;  // of every strand, resampled; otherwise as it is made
+  double width;                  // [m] strand diameter where no file gives it
   std::string pointer;
 };
 

@@ -152,6 +152,7 @@ def test_the_strands_of_a_mesh_can_be_simulated_themselves(program, scene, tmp_p
         ("/groom/hair_mesh=null", "/groom: found none of file, grow, hair_mesh"),
         ('/groom/attach="stored"', "/groom/attach: found \"stored\", expected none with hair_mesh"),
         ('/groom/interpolate={"count": 3}', "/groom/interpolate: found a key of simulated strands"),
+        ("/groom/particles=5", "/groom/particles: found a key of simulated strands"),
         ('/effects/wind={"velocity": [1, 0, 0], "shelter": {}}', "/effects/wind/shelter: found"),
         ('/model/hair_mesh={"stretch": -1}', "/model/hair_mesh/stretch: found -1, expected a number"),
         ('/model/type="ams"', "/model/hair_mesh: found hair_mesh with model \"ams\""),

@@ -25,7 +25,7 @@ ALLOWED = {
     "hairmesh": ("core/", "scene/", "groom/", "solids/", "state/", "kernels/"),
     "pipeline": ("core/", "scene/", "groom/", "solids/", "state/", "kernels/", "effects/", "hairmesh/"),
     "cache": ("core/", "state/"),
-    "study": ("core/", "scene/", "state/", "pipeline/"),
+    "study": ("core/", "scene/", "solids/", "state/", "pipeline/", "cache/"),
     # `info` and `groom` show and convert assets; nothing of the physics.
     "apps": ("core/", "scene/", "state/", "groom/", "solids/", "pipeline/", "cache/", "study/"),
 }

@@ -168,6 +168,8 @@ TEST_F(SceneLoad, ReadsGrooms) {
   EXPECT_EQ(s.grooms[0].stiffness[0].group, "a");
   EXPECT_EQ(s.grooms[0].stiffness[0].coupling, "edge");
   EXPECT_EQ(s.grooms[0].stiffness[0].curve, (Curve{{0, 1}, {0.5, 0.25}}));
+  EXPECT_EQ(s.grooms[0].particles, 20);
+  EXPECT_FALSE(s.grooms[1].particles);
   EXPECT_EQ(s.grooms[1].skin, folder_ / "c.tfxskin");
   EXPECT_EQ(s.grooms[1].attach, Attach::kFixed);
   EXPECT_EQ(s.grooms[2].name, "grown");

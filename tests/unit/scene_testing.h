@@ -102,7 +102,7 @@ class SceneTest : public testing::Test {
         {"file": ["a.hair", "b.hair"], "attach": "nearest", "attach_distance": 3, "penetration": "keep",
          "units": {"length": 0.5, "up": "x"}, "width": 0.01,
          "stiffness": [{"group": "a", "coupling": "edge", "curve": [[0, 1], [0.5, 0.25]]}],
-         "interpolate": {"group": "b", "neighbours": 2}},
+         "interpolate": {"group": "b", "neighbours": 2}, "particles": 20},
         {"name": "skin", "file": "c.tfx", "skin": "c.tfxskin", "attach": "fixed",
          "animation": {"interpolation": "smooth",
                        "keys": [{"frame": 1, "translate": [10, 0, 0], "rotate": [0, 0, 0, 1], "scale": 1}]},

@@ -1,0 +1,249 @@
+#include "study/record.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "core/error.h"
+#include "core/json_text.h"
+
+namespace ringlet::study {
+namespace {
+
+using Out = nlohmann::ordered_json;
+
+Out number(double value) { return std::isfinite(value) ? Out(value) : Out(nullptr); }
+
+Out spread(const std::optional<Spread>& spread) {
+  if (!spread) return nullptr;
+  return {{"rms", number(spread->rms)}, {"p99", number(spread->p99)}};
+}
+
+Out errors(const Errors& errors) {
+  Out out = {{"strands", errors.strands}};
+  for (const auto& [name, value] : errors.named()) out[name] = spread(value);
+  return out;
+}
+
+std::optional<Spread> read_spread(const Json& json) {
+  if (json.is_null()) return std::nullopt;
+  const auto value = [&](const char* key) {
+    return json[key].is_null() ? INFINITY : json[key].get<double>();
+  };
+  return Spread{value("rms"), value("p99")};
+}
+
+Errors read_errors(const Json& json) {
+  return {read_spread(json["error"]),  read_spread(json["velocity"]),    read_spread(json["length"]),
+          read_spread(json["volume"]), read_spread(json["penetration"]), json["strands"]};
+}
+
+Out row_json(const Study& study, const Row& row) {
+  Out out = {{"label", row.label}, {"settings", Out::object()}, {"arguments", row.options}};
+  for (std::size_t a = 0; a < study.axes.size(); ++a)
+    out["settings"][study.axes[a].name] =
+        Json::accept(row.columns[a]) ? Out::parse(row.columns[a]) : Out(row.columns[a]);
+  out["left_out"] = row.left_out;
+  out["status"] = to_string(row.status);
+  if (!row.message.empty()) out["message"] = row.message;
+  out["ms_per_frame"] = row.timed ? number(row.timed->milliseconds) : Out(nullptr);
+  out["stages_ms"] = Out::object();
+  if (row.timed)
+    for (const auto& [stage, spent] : row.timed->stages) out["stages_ms"][stage] = spent;
+  out["frames_timed"] = row.timed ? row.timed->frames : 0;
+  out["errors"] = errors(row.measured.errors);
+  out["resampled"] = row.measured.resampled;
+  out["reference_substeps"] = row.reference_substeps;
+  out["strands"] = row.measured.strands;
+  out["particles"] = row.measured.particles;
+  out["precision"] = row.precision;
+  out["backend"] = row.measured.backend;
+  out["instruction_set"] = row.measured.instruction_set;
+  out["key"] = row.key;
+  return out;
+}
+
+Out reference_json(const Study& study) {
+  Out levels = Out::array();
+  for (const Level& level : study.levels)
+    levels.push_back({{"substeps", level.substeps},
+                      {"diverged", level.diverged},
+                      {"change", spread(level.change)},
+                      {"order", level.order ? number(*level.order) : Out(nullptr)}});
+  return {{"precision", "double"},
+          {"substeps", study.reference_substeps},
+          {"cap", study.reference_cap},
+          {"set", study.reference_overrides},
+          {"converged", study.reference_converged},
+          {"resolution", study.resolution},
+          {"levels", levels},
+          {"float_error",
+           {{"substeps", study.single.substeps},
+            {"message", study.single.message},
+            {"errors", errors(study.single.errors)}}}};
+}
+
+Out answers_json(const Study& study) {
+  const Answers answers = answer(study);
+  const auto label = [&](const std::optional<std::size_t>& row) {
+    return row ? Out(study.rows[*row].label) : Out(nullptr);
+  };
+  Out out = {{"digit_cost", answers.digit_cost ? number(*answers.digit_cost) : Out(nullptr)},
+             {"knee", label(answers.knee)},
+             {"front", Out::array()},
+             {"wasted", Out::array()},
+             {"orders", Out::array()}};
+  for (const std::size_t row : answers.front) out["front"].push_back(study.rows[row].label);
+  for (std::size_t row = 0; row < study.rows.size(); ++row)
+    if (answers.beaten[row])
+      out["wasted"].push_back({{"run", study.rows[row].label}, {"instead", label(answers.beaten[row])}});
+  for (const Order& order : orders_of(study)) {
+    Out found = {{"axis", study.axes[order.axis].name}, {"values", order.values}, {"orders", Out::array()}};
+    for (const double value : order.orders) found["orders"].push_back(number(value));
+    out["orders"].push_back(found);
+  }
+  if (!study.wanted.budget && !study.wanted.target) return out;
+  out["budget_ms"] = study.wanted.budget ? Out(*study.wanted.budget) : Out(nullptr);
+  out["target"] = study.wanted.target ? Out(*study.wanted.target) : Out(nullptr);
+  out["picked"] = label(answers.picked);
+  out["picked_arguments"] = answers.picked ? Out(study.rows[*answers.picked].options) : Out(nullptr);
+  return out;
+}
+
+// `stages`: in the order they run, which `json` has lost.
+void read_row(const Json& json, const Out& stages, Row& row) {
+  row.status = json["status"] == "ok" ? Status::kOk : Status::kDiverged;
+  row.message = json.value("message", "");
+  if (!json["ms_per_frame"].is_null()) {
+    Timed& timed = row.timed.emplace();
+    timed.milliseconds = json["ms_per_frame"], timed.frames = json["frames_timed"];
+    for (const auto& [stage, spent] : stages.items()) timed.stages.emplace_back(stage, spent);
+  }
+  row.measured.errors = read_errors(json["errors"]);
+  row.measured.resampled = json["resampled"];
+  row.reference_substeps = json["reference_substeps"];
+  row.measured.strands = json["strands"], row.measured.particles = json["particles"];
+  row.measured.backend = json["backend"], row.measured.instruction_set = json["instruction_set"];
+}
+
+void read_reference(const Json& json, Study& study) {
+  study.levels.clear();
+  for (const Json& level : json["levels"]) {
+    Level read{level["substeps"], level["diverged"], read_spread(level["change"]), std::nullopt};
+    if (!level["order"].is_null()) read.order = level["order"].get<double>();
+    study.levels.push_back(read);
+  }
+  const Json& single = json["float_error"];
+  study.single = {single["substeps"], read_errors(single["errors"]), single["message"]};
+}
+
+// A field of a CSV file: quoted where it has to be.
+std::string field(const std::string& text) {
+  if (text.find_first_of(",\"\n") == text.npos) return text;
+  std::string out = "\"";
+  for (const char c : text) out += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return out + "\"";
+}
+
+std::string field(const std::optional<double>& value) {
+  return value && std::isfinite(*value) ? Json(*value).dump() : "";
+}
+
+// Every stage of any run, in the order they run.
+std::vector<std::string> all_stages(const Study& study) {
+  std::vector<std::string> names;
+  for (const Row& row : study.rows)
+    if (row.timed)
+      for (const auto& [stage, spent] : row.timed->stages)
+        if (std::find(names.begin(), names.end(), stage) == names.end()) names.push_back(stage);
+  return names;
+}
+
+}  // namespace
+
+const char* to_string(Status status) {
+  return status == Status::kOk ? "ok" : status == Status::kDiverged ? "diverged" : "not run";
+}
+
+std::string to_json(const Study& study) {
+  Out out = {{"format", "ringlet-study"},
+             {"identity", Out::parse(study.identity)},
+             {"scene", study.scene},
+             {"scene_hash", study.scene_hash},
+             {"length_unit", study.length_unit},
+             {"processor", study.processor},
+             {"frames", {study.frames.first, study.frames.last}},
+             {"repeats", study.repeats},
+             {"product", study.product},
+             {"complete", study.complete},
+             {"axes", Out::array()},
+             {"reference", reference_json(study)},
+             {"answers", answers_json(study)},
+             {"rows", Out::array()}};
+  for (const Axis& axis : study.axes) {
+    Out values = Out::array();
+    for (const Value& value : axis.values) values.push_back(value.text);
+    out["axes"].push_back({{"name", axis.name}, {"values", values}});
+  }
+  for (const Row& row : study.rows)
+    if (row.status != Status::kNew) out["rows"].push_back(row_json(study, row));
+  return out.dump(2) + "\n";
+}
+
+std::string to_csv(const Study& study) {
+  const std::vector<std::string> stages = all_stages(study);
+  std::string text;
+  const auto add = [&](const std::string& value) {
+    text += (text.empty() || text.back() == '\n' ? "" : ",") + value;
+  };
+  for (const Axis& axis : study.axes) add(field(axis.name));
+  add("ms_per_frame");
+  for (const auto& [name, value] : Errors{}.named()) add(name + "_rms"), add(name + "_p99");
+  for (const std::string& stage : stages) add("ms_" + stage);
+  for (const char* name : {"strands", "particles", "strands_compared", "precision", "backend", "status"})
+    add(name);
+  text += "\n";
+  for (const Row& row : study.rows) {
+    if (row.status == Status::kNew) continue;
+    for (const std::string& column : row.columns) add(field(column));
+    add(field(row.timed ? std::optional<double>(row.timed->milliseconds) : std::nullopt));
+    for (const auto& [name, value] : row.measured.errors.named()) {
+      add(field(value ? std::optional<double>(value->rms) : std::nullopt));
+      add(field(value ? std::optional<double>(value->p99) : std::nullopt));
+    }
+    for (const std::string& stage : stages) {
+      std::optional<double> spent;
+      if (row.timed)
+        for (const auto& [name, milliseconds] : row.timed->stages)
+          if (name == stage) spent = milliseconds;
+      add(field(spent));
+    }
+    add(std::to_string(row.measured.strands)), add(std::to_string(row.measured.particles));
+    add(std::to_string(row.measured.errors.strands));
+    add(row.precision), add(row.measured.backend), add(to_string(row.status));
+    text += "\n";
+  }
+  return text;
+}
+
+int take_over(const std::string& text, const std::string& file, Study& study) {
+  const Json json = parse_json(text, file);
+  try {
+    if (json.at("format") != "ringlet-study") throw Error(ErrorKind::kInput, file, "is no study");
+    if (json.at("identity") != Json::parse(study.identity)) return -1;
+    int rows = 0;
+    const Out ordered = Out::parse(text);
+    for (std::size_t k = 0; k < json.at("rows").size(); ++k) {
+      const Json& row = json["rows"][k];
+      for (Row& mine : study.rows)
+        if (mine.key == row.at("key")) read_row(row, ordered["rows"][k]["stages_ms"], mine), ++rows;
+    }
+    read_reference(json.at("reference"), study);
+    return rows;
+  } catch (const nlohmann::json::exception& error) {
+    throw Error(ErrorKind::kInput, file, std::string("is no study that can be gone on with: ") + error.what(),
+                "--overwrite begins anew");
+  }
+}
+
+}  // namespace ringlet::study

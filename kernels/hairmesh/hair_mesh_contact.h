@@ -59,18 +59,21 @@ RINGLET_FUNCTION void in_ellipsoid_axes(const MeshEllipsoid<T>& e, const double 
     from[k] = x[k] - double(e.centre[k]) + left * step * double(e.velocity[k]);
     turn[k] = e.turn[k];
   }
-  // Turned as the ellipsoid has still to turn: between unit quaternions, normalised.
-  const double sine = length_of(turn), cosine = sqrt(max(1 - sine * sine, 0.0));
-  const double w = 1 + left * (cosine - 1), size = sqrt(w * w + left * sine * left * sine);
-  double once[3];
-  for (int k = 0; k < 3; ++k) turn[k] *= left / size;
-  for (int k = 0; k < 3; ++k) {
-    const int i = (k + 1) % 3, j = (k + 2) % 3;
-    once[k] = 2 * (turn[i] * from[j] - turn[j] * from[i]);
-  }
-  for (int k = 0; k < 3; ++k) {
-    const int i = (k + 1) % 3, j = (k + 2) % 3;
-    from[k] += w / size * once[k] + (turn[i] * once[j] - turn[j] * once[i]);
+  const double sine = length_of(turn);
+  if (left > 0 && sine > 0) {
+    // Turned as the ellipsoid has still to turn: between unit quaternions, normalised.
+    const double cosine = sqrt(max(1 - sine * sine, 0.0));
+    const double w = 1 + left * (cosine - 1), size = sqrt(w * w + left * sine * left * sine);
+    double once[3];
+    for (int k = 0; k < 3; ++k) turn[k] *= left / size;
+    for (int k = 0; k < 3; ++k) {
+      const int i = (k + 1) % 3, j = (k + 2) % 3;
+      once[k] = 2 * (turn[i] * from[j] - turn[j] * from[i]);
+    }
+    for (int k = 0; k < 3; ++k) {
+      const int i = (k + 1) % 3, j = (k + 2) % 3;
+      from[k] += w / size * once[k] + (turn[i] * once[j] - turn[j] * once[i]);
+    }
   }
   for (int k = 0; k < 3; ++k) p[k] = from[0] * e.axis[k][0] + from[1] * e.axis[k][1] + from[2] * e.axis[k][2];
 }
@@ -163,31 +166,38 @@ RINGLET_FUNCTION bool find_on_ellipsoid(const MeshEllipsoid<T>& e, const T* befo
                                         double step, MeshSurfacePoint<T>& found) {
   // That counts as the surface: of the shortest radius, and of how deep inside may be.
   constexpr double kSkin = 0.02, kDeeper = 1.5;
-  double start[3], end[3], p[3], slid[3], radius[3], way[3], turn[3], widest = 0,
-                                                                      shortest = double(e.radius[0]);
+  double start[3], end[3], p[3], slid[3], radius[3], way[3], turn[3], shortest = double(e.radius[0]);
   for (int k = 0; k < 3; ++k) {
     start[k] = before[k], end[k] = point[k], radius[k] = e.radius[k], turn[k] = e.turn[k];
     way[k] = end[k] - start[k] - step * double(e.velocity[k]);
-    widest = max(widest, radius[k]), shortest = min(shortest, radius[k]);
+    shortest = min(shortest, radius[k]);
   }
   in_ellipsoid_axes(e, end, step, 0.0, p);
-  const double gone = length_of(way), away = length_of(p);
-  if (away > widest + double(reach) + gone) return false;  // turning alone brings nothing nearer
-  const bool inside = ellipsoid_level(radius, p) < 1;
+  const double gone = length_of(way), swept = gone + 2 * length_of(turn) * (length_of(p) + gone);
+  const double skin = max(-kDeeper * double(reach), kSkin * shortest);
+  const double level = ellipsoid_level(radius, p);
+  // At most the distance: over it the level's root rises by no more than the distance over this radius.
+  const double beside = (sqrt(level) - 1) * shortest;
+  if (!(level < 1)) {
+    if (swept > beside && slide_on_ellipsoid(e, radius, start, end, step, skin, slid)) {
+      surface_of_ellipsoid(e, radius, slid, found);
+      return true;
+    }
+    if (!(beside < double(reach))) return false;
+  }
   surface_of_ellipsoid(e, radius, p, found);
   double above = 0;  // signed distance
   for (int k = 0; k < 3; ++k) above += (end[k] - double(found.point[k])) * double(found.normal[k]);
-  const double swept = gone + 2 * length_of(turn) * (away + gone);
-  const double skin = max(-kDeeper * double(reach), kSkin * shortest);
-  const bool suspect = swept > (inside ? -above - skin : above);
-  if (suspect && slide_on_ellipsoid(e, radius, start, end, step, skin, slid)) {
+  if (level < 1 && swept > -above - skin && slide_on_ellipsoid(e, radius, start, end, step, skin, slid)) {
+    // The near side, unless that is what is nearest anyway.
     MeshSurfacePoint<T> entry;
     surface_of_ellipsoid(e, radius, slid, entry);
-    // The near side, unless it is what is nearest anyway.
     double same = 0;
     for (int k = 0; k < 3; ++k) same += double(entry.normal[k]) * double(found.normal[k]);
-    if (!inside || same < 0) found = entry;
-    return true;
+    if (same < 0) {
+      found = entry;
+      return true;
+    }
   }
   return above < double(reach);
 }

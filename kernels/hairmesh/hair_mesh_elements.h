@@ -120,7 +120,7 @@ struct BlockPattern {
 template <class T>
 struct MeshSample {
   std::int32_t vertex[4];  // that it is the mean of; -1: fewer
-  T slack;  // how far it may be in a solid that its vertices are out of, as chords of what is round are [m]
+  T span;                  // from the first of them to the farthest, at rest [m]
 };
 
 template <class T>

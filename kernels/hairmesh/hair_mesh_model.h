@@ -311,7 +311,7 @@ class HairMeshModel {
         const RestPoint across = at(v) - at(vertices[0]);
         longest = std::max(longest, std::sqrt(dot(across, across)));
       }
-    sample.slack = static_cast<T>(0.15 * longest);
+    sample.span = static_cast<T>(longest);
     samples_.push_back(sample);
   }
 

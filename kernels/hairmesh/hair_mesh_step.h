@@ -123,16 +123,22 @@ class MeshStepper final : public HairMeshSolver<T> {
   }
 
   MeshContactFigures collide(const MeshSurface<T>& surface) override {
-    collide_with([&](const T* before, const T* point, T reach, MeshSurfacePoint<T>& found) {
-      return surface.find(surface.context, before, point, reach, found);
-    });
+    collide_with(
+        [&](const T* before, const T* point, T reach, MeshSurfacePoint<T>& found) {
+          return surface.find(surface.context, before, point, reach, found);
+        },
+        T(0));
     return contact_figures();
   }
   MeshContactFigures collide(const MeshEllipsoid<T>* ellipsoids, std::int32_t count) override {
-    for (std::int32_t k = 0; k < count; ++k)
-      collide_with([&](const T* before, const T* point, T reach, MeshSurfacePoint<T>& found) {
-        return find_on_ellipsoid(ellipsoids[k], before, point, reach, static_cast<double>(step_), found);
-      });
+    for (std::int32_t k = 0; k < count; ++k) {
+      const T* radius = ellipsoids[k].radius;
+      collide_with(
+          [&](const T* before, const T* point, T reach, MeshSurfacePoint<T>& found) {
+            return find_on_ellipsoid(ellipsoids[k], before, point, reach, static_cast<double>(step_), found);
+          },
+          min(radius[0], min(radius[1], radius[2])));
+    }
     return contact_figures();
   }
 
@@ -275,9 +281,10 @@ class MeshStepper final : public HairMeshSolver<T> {
   }
   static RINGLET_KERNEL T square(Padded<T> a) { return dot_product(a, a); }
 
-  // A surface holds what it held, as far as it reaches.
+  // A surface holds what it held, as far as it reaches. What is not under `thickness` wide cannot get in
+  // between vertices that are nearer to each other.
   template <class Find>
-  void collide_with(const Find& find) {
+  void collide_with(const Find& find, T thickness) {
     const std::int32_t solid = solids_met_++;
     for (const std::int32_t i : external_) {
       MeshSurfacePoint<T> found;
@@ -300,9 +307,11 @@ class MeshStepper final : public HairMeshSolver<T> {
       velocity()[i] = velocity_after_contact<T>(velocity()[i], padded(found.velocity), n, found.friction);
       hold(i, solid, found);
     }
-    for (const MeshSample<T>& sample : samples_) collide_between(find, sample);
+    for (const MeshSample<T>& sample : samples_)
+      if (sample.span > thickness) collide_between(find, sample);
   }
-  // A sample that is deeper than its slack takes its vertices along, without approach from then on.
+  // A sample that is deeper in a solid than chords of what is round are takes its vertices along, without
+  // approach from then on.
   template <class Find>
   void collide_between(const Find& find, const MeshSample<T>& sample) {
     Padded<T> from{}, at{}, rate{};
@@ -311,12 +320,12 @@ class MeshStepper final : public HairMeshSolver<T> {
       const std::int32_t i = sample.vertex[count++];
       from += vectors(before_)[i], at += position()[i], rate += velocity()[i];
     }
-    const T share = T(1) / static_cast<T>(count);
+    const T share = T(1) / static_cast<T>(count), slack = T(0.15) * sample.span;
     MeshSurfacePoint<T> found;
     T before[3], point[3];
     store_three(before, share * from), store_three(point, share * at);
-    if (!find(before, point, -sample.slack, found)) return;
-    const Padded<T> n = padded(found.normal), out = padded(found.point) - sample.slack * n - padded(point);
+    if (!find(before, point, -slack, found)) return;
+    const Padded<T> n = padded(found.normal), out = padded(found.point) - slack * n - padded(point);
     const T depth = dot_product(n, out);
     if (!(depth > T(0))) return;
     depth_ = max(depth_, static_cast<double>(depth));

@@ -97,6 +97,17 @@ struct ContactLane {
     if (solid == step.home) contact.skin = skin;
     return contact;
   }
+  // Begins a walk along the strand. Roots lie on the home solid, and deeper in it only as a groom is kept
+  // there.
+  RINGLET_FUNCTION void begin(StrandContact<T>& contact) const {
+    if (&contact.solid != step.solids + step.home || step.home < 0) contact.begin_at_root();
+    for (int i = 1; i < first(); ++i) go_to(contact, i);
+  }
+  RINGLET_FUNCTION void go_to(StrandContact<T>& contact, int i) const {
+    if (!(contact.slack > T(0))) return;
+    const std::int64_t segment = step.batches.row[batch] + i - 1;
+    contact.go_along(step.batches.rest_length[segment * 3 * kLanes + lane]);
+  }
   template <class Visit>
   RINGLET_FUNCTION void for_each_solid(const Visit& visit) const {
     for (int solid = 0; solid < step.solid_count; ++solid)
@@ -122,9 +133,11 @@ struct ContactLane {
 
   RINGLET_FUNCTION void collide(LaneFigures<T>& figures) const {
     const T reach = extent();
-    for_each_solid([&](const StrandContact<T>& contact) {
+    for_each_solid([&](StrandContact<T> contact) {
       if (!contact.within_reach(reach)) return;
+      begin(contact);
       for (int i = first(); i < count; ++i) {
+        go_to(contact, i);
         Vector3<T> x = pack.get(pack.position, i, in_pack), v = pack.get(pack.velocity, i, in_pack), n;
         if (!collide_particle(contact, x, v, n, clearance(i), figures)) continue;
         figures.touched = true;
@@ -139,12 +152,16 @@ struct ContactLane {
   // no push could reconcile with its length.
   RINGLET_FUNCTION void push(LaneFigures<T>& figures, bool segments) const {
     figures.pushed = T(0);
-    for_each_solid([&](const StrandContact<T>& contact) {
+    for_each_solid([&](StrandContact<T> contact) {
       if (segments) {
         for (int i = 0; i < count; ++i) clearance(i) = T(0) - contact.band;  // lengths have moved all
         push_segments(contact, figures);
       }
-      for (int i = first(); i < count; ++i) push_particle(contact, i, contact.sample(position(i)), figures);
+      begin(contact);
+      for (int i = first(); i < count; ++i) {
+        go_to(contact, i);
+        push_particle(contact, i, contact.sample(position(i)), figures);
+      }
     });
   }
 
@@ -154,7 +171,9 @@ struct ContactLane {
   RINGLET_FUNCTION void push_to_own_sheet(LaneFigures<T>& figures) const {
     figures.pushed = T(0);
     for_each_solid([&](StrandContact<T> contact) {
+      begin(contact);
       for (int i = first(); i < count; ++i) {
+        go_to(contact, i);
         SurfaceSample<T> at = contact.sample(position(i));
         if (contact.skin.triangle >= 0) {
           const SurfaceSample<T> own =
@@ -184,9 +203,11 @@ struct ContactLane {
 
   // Segments longer than two voxels are sampled along their length too, or fingers pass between particles: a
   // sample that is inside moves both ends. The root's own segment comes out of the solid and is left alone.
-  RINGLET_FUNCTION void push_segments(const StrandContact<T>& contact, LaneFigures<T>& figures) const {
+  RINGLET_FUNCTION void push_segments(StrandContact<T> contact, LaneFigures<T>& figures) const {
     const T allowed = static_cast<T>(kChordVoxels) * contact.voxel;
+    begin(contact);
     for (int i = first(); i + 1 < count; ++i) {
+      go_to(contact, i);
       Vector3<T> a = position(i), b = position(i + 1);
       const T along = length(b - a);
       if (clearance(i) + clearance(i + 1) > along) continue;  // distances change no faster than places

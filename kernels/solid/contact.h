@@ -79,7 +79,7 @@ struct StrandContact {
   RINGLET_FUNCTION void begin_at_root() {
     slack = max(T(0), T(0) - sample_surface(solid, root, skin).distance);
   }
-  RINGLET_FUNCTION void go_along(T segment) { slack = max(T(0), slack - segment); }
+  RINGLET_FUNCTION void go_along(T segment) { slack = max(T(0), fma(T(-0.25), segment, slack)); }
   RINGLET_FUNCTION Vector3<T> world_normal(const SurfaceSample<T>& at) const {
     return rotate(solid.rotation, at.normal);
   }

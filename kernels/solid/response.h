@@ -59,6 +59,12 @@ RINGLET_FUNCTION T settled_push() {
   return T(2e-6);
 }
 
+// Deeper than anything lies in a solid [m].
+template <class T>
+RINGLET_FUNCTION T far_inside() {
+  return T(1e9);
+}
+
 // A pack's strands in scratch, and one lane of it as scalars.
 template <class R>
 struct ContactPack {
@@ -101,12 +107,18 @@ struct ContactLane {
   // there.
   RINGLET_FUNCTION void begin(StrandContact<T>& contact) const {
     if (&contact.solid != step.solids + step.home || step.home < 0) contact.begin_at_root();
+    T longest = T(0);
+    for (int i = 1; i < count && contact.slack > T(0); ++i) longest = longest + segment_before(i);
+    if (contact.slack > longest) contact.slack = far_inside<T>();
     for (int i = 1; i < first(); ++i) go_to(contact, i);
   }
   RINGLET_FUNCTION void go_to(StrandContact<T>& contact, int i) const {
     if (!(contact.slack > T(0))) return;
-    const std::int64_t segment = step.batches.row[batch] + i - 1;
-    contact.go_along(step.batches.rest_length[segment * 3 * kLanes + lane]);
+    contact.go_along(segment_before(i));
+  }
+  RINGLET_FUNCTION T segment_before(int i) const {
+    const std::int64_t row = step.batches.row[batch] + i - 1;
+    return step.batches.rest_length[row * 3 * kLanes + lane];
   }
   template <class Visit>
   RINGLET_FUNCTION void for_each_solid(const Visit& visit) const {

@@ -164,8 +164,8 @@ Bounds bounds_of(const Scenario& scenario, const Outcome& outcome) {
   bounds.strain = lengths ? kHeldStrain : std::max({energetic, turned, outcome.strain_at_start});
   bounds.moved_strain = lengths ? kMovedStrain : bounds.strain;
   const double rest = at_rest(scenario, scene);
-  // What creeps by s in all goes nowhere faster than s / (e t) after a time t.
-  bounds.last_speed = scenario.creeps ? reach / (std::numbers::e * (scenario.seconds - scenario.calm)) : rest;
+  // What creeps ever slower, and by s in all, goes at s / t at most after a time t.
+  bounds.last_speed = scenario.creeps ? std::max(rest, reach / (scenario.seconds - scenario.calm)) : rest;
   bounds.rest = scenario.creeps ? 0 : time_to_rest(motion, rest, bounds.speed, reach);
   return bounds;
 }

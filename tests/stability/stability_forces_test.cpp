@@ -29,10 +29,16 @@ const std::vector<Scenario> kWeights = {shaken("no_gravity", {kNoGravity}),
                                         let_go("100_g_let_go_one_substep", {kHeavy, "/model/substeps=1"})};
 INSTANTIATE_TEST_SUITE_P(Weights, Stability, testing::ValuesIn(everywhere(kWeights)), case_name);
 
+// What the wind has tangled at one step a frame, what still air holds fast, and weight that angular couplings
+// all but carry give way slowly.
+Scenario creeping(Scenario scenario) {
+  scenario.creeps = true;
+  return scenario;
+}
 // Only drag brings them to rest.
 const std::vector<Scenario> kUnheld = {
-    shaken("kappa_I_0", {kNoIntegrity, kDrag}),
-    let_go("kappa_I_0_let_go", {kNoIntegrity, kDrag}),
+    creeping(shaken("kappa_I_0", {kNoIntegrity, kDrag})),
+    creeping(let_go("kappa_I_0_let_go", {kNoIntegrity, kDrag})),
     shaken("kappa_I_0_kappa_alpha_0", {kNoIntegrity, "/model/stiffness/angular=0", kDrag}),
     shaken("kappa_alpha_1e6", {"/model/stiffness/angular=1e6"}),
     shaken("kappa_I_1e6", {"/model/stiffness/integrity=1e6"}),
@@ -54,12 +60,12 @@ Scenario blown(const char* name, double speed, std::vector<std::string> set = {}
 }
 const std::vector<Scenario> kWinds = {
     blown("wind_300", 300),
-    blown("wind_300_one_substep", 300, {"/model/substeps=1"}),
+    creeping(blown("wind_300_one_substep", 300, {"/model/substeps=1"})),
     blown("wind_300_turbulent", 300, {}, 0.5),
     blown("wind_300_lengths_free", 300, {"/effects/inextensible=null"}),
     blown("particle_mass_2e6_wind_30", 30, {"/model/particle_mass=2e6"}),
     blown("particle_mass_1e9_wind_30", 30, {"/model/particle_mass=1e9"}),
-    blown("particle_mass_1e_minus_6_wind_30", 30, {"/model/particle_mass=1e-6"}),
+    creeping(blown("particle_mass_1e_minus_6_wind_30", 30, {"/model/particle_mass=1e-6"})),
     shaken("particle_mass_1e9_shaken", {"/model/particle_mass=1e9"})};
 INSTANTIATE_TEST_SUITE_P(Winds, Stability, testing::ValuesIn(everywhere(kWinds)), case_name);
 

@@ -323,20 +323,25 @@ double at_rest(const Scenario& scenario, const scene::Scene& scene) {
   constexpr double kStill = 1e-3;
   const double step = 1 / (scene.frames.fps * scene.model.substeps);
   const double weight = scene.effects.gravity.value_or(Vec3::Zero()).norm();
+  const bool ams = scenario.model == Model::kAms;
+  const bool carried = ams && scene.model.preload && scene.model.stiffness.integrity > 0;
   double rest = kStill;
   for (const Strand& strand : scenario.hair) {
+    const double count = static_cast<double>(strand.size());
     double length = 0;
     for (std::size_t i = 1; i < strand.size(); ++i) length += (strand[i] - strand[i - 1]).norm();
-    if (scenario.model == Model::kMassSpring) {
-      // Mass springs that hang bent tremble for good: where another altitude of a tetrahedron becomes the
-      // shortest, its force jumps, and what the weight has stretched, four springs abreast, is let go and
-      // taken up within the damping's time.
-      const double stretch = 4 * weight * 2 * static_cast<double>(strand.size()) / scene.model.stiffness.edge;
-      rest = std::max(rest, stretch / (step + scene.model.material_damping));
-    } else if (!(scene.model.preload && scene.model.stiffness.integrity > 0) && scene.effects.inextensible) {
-      // Weight that lengths bear: each step falls and is put right to within the tolerance.
-      rest = std::max(rest, scene.effects.inextensible->tolerance * length / step);
-    }
+    // Mass springs that hang bent tremble for good: where another altitude of a tetrahedron becomes the
+    // shortest, its force jumps, and what the weight has stretched, four springs abreast, is let go and taken
+    // up within the damping's time.
+    if (!ams)
+      rest = std::max(
+          rest, 8 * weight * count / scene.model.stiffness.edge / (step + scene.model.material_damping));
+    if (carried || !scene.effects.inextensible || length == 0) continue;
+    // Weight that lengths bear falls through the slack of their tolerance, and where a step is longer than
+    // the tension's fastest mode can be followed (h w > 2, w^2 = 4 g n / l), by what a step gives it.
+    const double slack = scene.effects.inextensible->tolerance * length;
+    rest = std::max({rest, slack / step, std::sqrt(2 * weight * slack)});
+    if (step * std::sqrt(weight * count * count / length) > 1) rest = std::max(rest, weight * step);
   }
   return rest;
 }

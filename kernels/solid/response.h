@@ -104,7 +104,7 @@ struct ContactLane {
     return contact;
   }
   // Begins a walk along the strand. Roots lie on the home solid, and deeper in it only as a groom is kept
-  // there.
+  // there. With a solid that its root is in deeper than it is long a strand does not collide at all.
   RINGLET_FUNCTION void begin(StrandContact<T>& contact) const {
     if (&contact.solid != step.solids + step.home || step.home < 0) contact.begin_at_root();
     T longest = T(0);

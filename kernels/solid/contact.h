@@ -34,6 +34,9 @@ struct StrandContact {
   T step;
   T voxel, band;  // [m]
   Patch skin;     // that the strand grows on
+  // How deep a particle may lie in the solid [m]: of one in which the root is buried, less the hair from
+  // there.
+  T slack = T(0);
 
   RINGLET_FUNCTION StrandContact(const SolidView& s, const Vector3<double>& root_point, T h)
       : solid(s),
@@ -60,13 +63,25 @@ struct StrandContact {
   RINGLET_FUNCTION Vector3<T> local(Vector3<T> x) const { return root + rotate_back(solid.rotation, x); }
   RINGLET_FUNCTION Vector3<T> world(Vector3<T> p) const { return rotate(solid.rotation, p - root); }
 
+  // Distances are to where the particle may lie.
   RINGLET_FUNCTION SurfaceSample<T> sample(Vector3<T> x) const {
-    return sample_surface(solid, local(x), skin);
+    SurfaceSample<T> at = sample_surface(solid, local(x), skin);
+    at.distance = at.distance + slack;
+    return at;
   }
   // The same where only what is deeper than a chord's dip matters.
   RINGLET_FUNCTION SurfaceSample<T> sample_inside(Vector3<T> x) const {
-    return sample_surface(solid, local(x), skin, static_cast<T>(kNearVoxels - kChordVoxels) * voxel);
+    SurfaceSample<T> at =
+        sample_surface(solid, local(x), skin, static_cast<T>(kNearVoxels - kChordVoxels) * voxel);
+    at.distance = at.distance + slack;
+    return at;
   }
+  // Begins at the root: no hair reaches out of a solid that its root is buried in deeper than the hair is
+  // long.
+  RINGLET_FUNCTION void begin_at_root() {
+    slack = max(T(0), T(0) - sample_surface(solid, root, skin).distance);
+  }
+  RINGLET_FUNCTION void go_along(T segment) { slack = max(T(0), fma(T(-0.25), segment, slack)); }
   RINGLET_FUNCTION Vector3<T> world_normal(const SurfaceSample<T>& at) const {
     return rotate(solid.rotation, at.normal);
   }
@@ -160,7 +175,7 @@ RINGLET_FUNCTION bool collide_particle(const StrandContact<T>& contact, Vector3<
                                        Vector3<T>& normal, T& clearance, LaneFigures<T>& figures) {
   SurfaceSample<T> at = contact.sample(x);
   clearance = max(T(0), at.distance);
-  const Entry<T> entry = hidden_entry(contact, x, v, at, figures);
+  const Entry<T> entry = contact.slack > T(0) ? Entry<T>{} : hidden_entry(contact, x, v, at, figures);
   if (entry.found) at = contact.sample(entry.x);
   if (!at.exact || !(entry.found || at.distance < T(0))) return false;
   clearance = T(0);

@@ -59,6 +59,12 @@ RINGLET_FUNCTION T settled_push() {
   return T(2e-6);
 }
 
+// Deeper than anything lies in a solid [m].
+template <class T>
+RINGLET_FUNCTION T far_inside() {
+  return T(1e9);
+}
+
 // A pack's strands in scratch, and one lane of it as scalars.
 template <class R>
 struct ContactPack {
@@ -97,6 +103,23 @@ struct ContactLane {
     if (solid == step.home) contact.skin = skin;
     return contact;
   }
+  // Begins a walk along the strand. Roots lie on the home solid, and deeper in it only as a groom is kept
+  // there. With a solid that its root is in deeper than it is long a strand does not collide at all.
+  RINGLET_FUNCTION void begin(StrandContact<T>& contact) const {
+    if (&contact.solid != step.solids + step.home || step.home < 0) contact.begin_at_root();
+    T longest = T(0);
+    for (int i = 1; i < count && contact.slack > T(0); ++i) longest = longest + segment_before(i);
+    if (contact.slack > longest) contact.slack = far_inside<T>();
+    for (int i = 1; i < first(); ++i) go_to(contact, i);
+  }
+  RINGLET_FUNCTION void go_to(StrandContact<T>& contact, int i) const {
+    if (!(contact.slack > T(0))) return;
+    contact.go_along(segment_before(i));
+  }
+  RINGLET_FUNCTION T segment_before(int i) const {
+    const std::int64_t row = step.batches.row[batch] + i - 1;
+    return step.batches.rest_length[row * 3 * kLanes + lane];
+  }
   template <class Visit>
   RINGLET_FUNCTION void for_each_solid(const Visit& visit) const {
     for (int solid = 0; solid < step.solid_count; ++solid)
@@ -122,9 +145,11 @@ struct ContactLane {
 
   RINGLET_FUNCTION void collide(LaneFigures<T>& figures) const {
     const T reach = extent();
-    for_each_solid([&](const StrandContact<T>& contact) {
+    for_each_solid([&](StrandContact<T> contact) {
       if (!contact.within_reach(reach)) return;
+      begin(contact);
       for (int i = first(); i < count; ++i) {
+        go_to(contact, i);
         Vector3<T> x = pack.get(pack.position, i, in_pack), v = pack.get(pack.velocity, i, in_pack), n;
         if (!collide_particle(contact, x, v, n, clearance(i), figures)) continue;
         figures.touched = true;
@@ -139,12 +164,16 @@ struct ContactLane {
   // no push could reconcile with its length.
   RINGLET_FUNCTION void push(LaneFigures<T>& figures, bool segments) const {
     figures.pushed = T(0);
-    for_each_solid([&](const StrandContact<T>& contact) {
+    for_each_solid([&](StrandContact<T> contact) {
       if (segments) {
         for (int i = 0; i < count; ++i) clearance(i) = T(0) - contact.band;  // lengths have moved all
         push_segments(contact, figures);
       }
-      for (int i = first(); i < count; ++i) push_particle(contact, i, contact.sample(position(i)), figures);
+      begin(contact);
+      for (int i = first(); i < count; ++i) {
+        go_to(contact, i);
+        push_particle(contact, i, contact.sample(position(i)), figures);
+      }
     });
   }
 
@@ -154,7 +183,9 @@ struct ContactLane {
   RINGLET_FUNCTION void push_to_own_sheet(LaneFigures<T>& figures) const {
     figures.pushed = T(0);
     for_each_solid([&](StrandContact<T> contact) {
+      begin(contact);
       for (int i = first(); i < count; ++i) {
+        go_to(contact, i);
         SurfaceSample<T> at = contact.sample(position(i));
         if (contact.skin.triangle >= 0) {
           const SurfaceSample<T> own =
@@ -184,9 +215,11 @@ struct ContactLane {
 
   // Segments longer than two voxels are sampled along their length too, or fingers pass between particles: a
   // sample that is inside moves both ends. The root's own segment comes out of the solid and is left alone.
-  RINGLET_FUNCTION void push_segments(const StrandContact<T>& contact, LaneFigures<T>& figures) const {
+  RINGLET_FUNCTION void push_segments(StrandContact<T> contact, LaneFigures<T>& figures) const {
     const T allowed = static_cast<T>(kChordVoxels) * contact.voxel;
+    begin(contact);
     for (int i = first(); i + 1 < count; ++i) {
+      go_to(contact, i);
       Vector3<T> a = position(i), b = position(i + 1);
       const T along = length(b - a);
       if (clearance(i) + clearance(i + 1) > along) continue;  // distances change no faster than places

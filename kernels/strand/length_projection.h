@@ -113,6 +113,28 @@ struct ProjectionResult {
   R iterations;  // taken
 };
 
+// The last resort, for the `late` lanes: every segment at its length in the direction that it has, one after
+// the other from the root on. Lengths hold however far they were off. It is not the least displacement and
+// takes momentum from the strand, so it is for what the projection does not bring back.
+template <class R>
+RINGLET_FUNCTION void lay_out_lengths(const ProjectedStrand<R>& s, Mask<R> late) {
+  const R nothing = shortest_direction<R>();
+  Vector3<R> here = load3<R>(s.position, s.stride), moved = zero3<R>();
+  for (int k = 0; k + 1 < s.particles; ++k) {
+    Scalar<R>*x = s.position + 3 * (k + 1) * s.stride, *v = s.velocity + 3 * (k + 1) * s.stride;
+    const Vector3<R> next = load3<R>(x, s.stride), segment = next - here;
+    const R rest = load<R>(s.rest_length + 3 * k * s.rest_stride), now = length(segment);
+    const Mask<R> held =
+        late & (R(Scalar<R>(k + 1)) < s.count) & (rest > shortest_held<R>()) & (now > nothing);
+    const R change = select(held, fma(rest, inverse_or_zero(now, nothing), R(-1)), R(0));
+    moved = k + 1 < s.clamped ? zero3<R>() : fma(change, segment, moved);
+    moved = select(R(Scalar<R>(k + 1)) < s.count, moved, zero3<R>());
+    store3<R>(x, s.stride, next + moved);
+    store3<R>(v, s.stride, fma(s.per_h, moved, load3<R>(v, s.stride)));
+    here = next;
+  }
+}
+
 // Newton until every lane's strain is within the tolerance, or `max_iterations`. A lane that is done stays as
 // it is, whatever its neighbours need: results do not depend on which strands share a pack.
 template <class R>

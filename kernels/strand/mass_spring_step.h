@@ -147,7 +147,7 @@ struct MassSpring {
   }
 
   RINGLET_KERNEL SubstepResult<R> advance(const RootMotion<R>& root, R h, const Arrays& from,
-                                          const Arrays& to, T* factor, Mask<R> active) const {
+                                          const Arrays& to, T* factor, Mask<R> active, bool last_try) const {
     const GhostMotion<R> frame(root, zero3<R>(), R(1) / h);
     const int stride = to.hair.stride;
     factorise(frame, h, from, factor, stride);
@@ -164,7 +164,7 @@ struct MassSpring {
       to.of(node).put(node / 2, select(lives(node), x, zero3<R>()), select(lives(node), v, zero3<R>()));
       later[2] = later[1], later[1] = later[0], later[0] = v;
     }
-    return project_stepped(s, step.parameters, h, to.hair, factor, active);
+    return project_stepped(s, step.parameters, h, to.hair, factor, active, last_try);
   }
 
   RINGLET_KERNEL R write_back(const Arrays& from, const Arrays& to, Mask<R> done) const {

@@ -272,23 +272,27 @@ struct SubstepResult {
 };
 
 // The lengths of a step h that led to `to`. `scratch` holds kProjectionReals values a particle, `to.stride`
-// apart.
+// apart. `last_try`: strands are not to try again, what is off is laid out.
 template <class R>
 RINGLET_KERNEL SubstepResult<R> project_stepped(const StrandPack<R>& s, const StrandParameters<Scalar<R>>& p,
                                                 R h, const StrandArrays<R>& to, Scalar<R>* scratch,
-                                                Mask<R> active) {
+                                                Mask<R> active, bool last_try) {
   const ProjectedStrand<R> lengths{
       to.position,   to.velocity, R(1) / (h * R(Scalar<R>(1 + p.skipped_substeps))),
       s.rest_length, kLanes,      nullptr,
       scratch,       to.stride,   s.particles,
       s.count,       p.clamped};
-  const ProjectionResult<R> result =
-      project_lengths(lengths, R(p.length_tolerance), p.length_iterations, active);
+  ProjectionResult<R> result = project_lengths(lengths, R(p.length_tolerance), p.length_iterations, active);
+  const Mask<R> late = active & (result.strain > R(p.length_tolerance));
+  if (last_try && p.length_iterations > 0 && any(late)) {
+    lay_out_lengths(lengths, late);
+    result.strain = eliminate_lengths(lengths);
+  }
   return {result.strain, result.iterations};
 }
 
 // A strand whose lengths did not come within the tolerance takes the step again in 2, 4, ... up to this many
-// pieces.
+// pieces; in the last of these tries lengths that are still off are laid out.
 inline constexpr int kMostPieces = 16;
 
 // Moves the lanes that are `done` from scratch to the state. Returns their largest squared speed, NaN where
@@ -331,7 +335,7 @@ struct AugmentedMassSpring {
   // relative to the moved root, lengths with their velocity correction. `factor` holds kFactorReals values a
   // particle, `to.stride` apart.
   RINGLET_KERNEL SubstepResult<R> advance(const RootMotion<R>& root, R h, const Arrays& from,
-                                          const Arrays& to, T* factor, Mask<R> active) const {
+                                          const Arrays& to, T* factor, Mask<R> active, bool last_try) const {
     const StrandParameters<T>& p = step.parameters;
     const GhostMotion<R> ghosts(root, s.preload, R(1) / h);
     const int stride = to.stride;
@@ -351,7 +355,7 @@ struct AugmentedMassSpring {
       to.put(i, select(lives, x, zero3<R>()), select(lives, v, zero3<R>()));
       later[2] = later[1], later[1] = later[0], later[0] = v;
     }
-    return project_stepped(s, p, h, to, factor, active);
+    return project_stepped(s, p, h, to, factor, active, last_try);
   }
 
   RINGLET_KERNEL R write_back(const Arrays& from, const Arrays& to, Mask<R> done) const {
@@ -377,8 +381,8 @@ RINGLET_KERNEL void step_strands(const StrandStep<Scalar<R>>& step, int batch, i
     R worst = R(0);
     for (int part = 0; part < parts; ++part) {
       const Arrays from = part == 0 ? state : stepped;
-      const SubstepResult<R> result =
-          model.advance(piece(s.root, part, parts), R(p.step / T(parts)), from, stepped, scratch, open);
+      const SubstepResult<R> result = model.advance(piece(s.root, part, parts), R(p.step / T(parts)), from,
+                                                    stepped, scratch, open, 2 * parts > kMostPieces);
       worst = select(open, result.strain, worst);
       iterations = iterations + select(open, result.iterations, R(0));
     }

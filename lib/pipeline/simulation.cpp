@@ -20,6 +20,7 @@
 #include "pipeline/frames.h"
 #include "pipeline/hair_mesh_simulation.h"
 #include "pipeline/health.h"
+#include "pipeline/precision.h"
 #include "pipeline/report.h"
 #include "pipeline/substep_control.h"
 #include "pipeline/world.h"
@@ -55,6 +56,7 @@ std::vector<float> radii(const scene::Scene& scene, const groom::Strands& strand
 
 template <class T>
 state::StrandInput strand_input(const scene::Scene& scene, const World& world) {
+  if constexpr (sizeof(T) == sizeof(float)) refuse_stiff_in_float(scene, world.stiffness);
   state::StrandInput input;
   const groom::Strands& strands = world.simulated.strands;
   for (std::size_t s = 0; s < strands.size(); ++s) input.counts.push_back(strands.count(s));

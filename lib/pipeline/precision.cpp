@@ -1,0 +1,31 @@
+#include "pipeline/precision.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "core/error.h"
+#include "kernels/strand/strand_batch.h"
+
+namespace ringlet::pipeline {
+
+using kernels::kCouplings;
+
+void refuse_stiff_in_float(const scene::Scene& scene, std::span<const float> scaled) {
+  static constexpr const char* kNames[kCouplings] = {"edge", "bend", "twist", "integrity", "angular"};
+  const scene::Stiffness& s = scene.model.stiffness;
+  double most[kCouplings] = {s.edge, s.bend, s.twist, s.integrity, s.angular};
+  if (!scaled.empty()) {  // the grooms' curves have the last word
+    std::fill(std::begin(most), std::end(most), 0.0);
+    for (std::size_t i = 0; i < scaled.size(); ++i)
+      most[i % kCouplings] = std::max(most[i % kCouplings], static_cast<double>(scaled[i]));
+  }
+  for (int k = 0; k < kCouplings; ++k)
+    if (most[k] > kStiffestInFloat)
+      throw Error(ErrorKind::kInput, fmt::format("{}#/model/stiffness/{}", scene.file.string(), kNames[k]),
+                  fmt::format("is {:.3g}{}, expected at most {:g} in single precision", most[k],
+                              scaled.empty() ? "" : " where a groom's curve scales it", kStiffestInFloat),
+                  "run it with --precision double, or make it softer: hair keeps its length by inextensible");
+}
+
+}  // namespace ringlet::pipeline

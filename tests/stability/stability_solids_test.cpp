@@ -1,0 +1,108 @@
+// Solids that no animator meant: they close on hair, appear around it, are thinner than their voxels, hold it
+// inside.
+#include <fmt/format.h>
+
+#include "stability/suite.h"
+
+namespace ringlet::stability {
+namespace {
+
+constexpr double kNear = 0.01;  // [m]
+
+struct Key {
+  double frame;
+  Vec3 place;
+};
+std::string solid(const char* name, const std::vector<Key>& keys, const char* called = "solid") {
+  std::string text;
+  for (const Key& key : keys)
+    text += fmt::format("{}{{\"frame\": {}, \"translate\": [{}, {}, {}]}}", text.empty() ? "" : ", ",
+                        key.frame, key.place.x(), key.place.y(), key.place.z());
+  return fmt::format(
+      "{{\"source\": \"{}.obj\", \"name\": \"{}\", \"resolution\": 48, \"animation\": {{\"interpolation\": "
+      "\"linear\", "
+      "\"keys\": [{}]}}}}",
+      name, called, text);
+}
+std::string solids(const std::vector<std::string>& each) {
+  std::string text;
+  for (const std::string& one : each) text += (text.empty() ? "" : ", ") + one;
+  return "/effects/solids=[" + text + "]";
+}
+
+// All roots in the plane y = 0.
+std::vector<Strand> flat_hair() {
+  return {straight(Vec3::Zero(), Vec3::UnitX()), straight(Vec3(0, 0, kNear), Vec3(1, 0, 1)),
+          helix(Vec3(kNear, 0, 0), Vec3(1, 0, 0.3)), helix(Vec3(0, 0, -kNear), Vec3(1, 0, -1))};
+}
+
+Scenario among(const char* name, std::string each, std::map<std::string, Vec3> boxes, double speed,
+               double calm, bool pressed) {
+  Scenario scenario{.name = name, .hair = flat_hair(), .set = {std::move(each)}, .seconds = calm + 10};
+  scenario.solid = speed, scenario.calm = calm, scenario.pressed = pressed, scenario.boxes = std::move(boxes);
+  return scenario;
+}
+
+// Two slabs that close to `gap` from 10 cm to either side within `frames`.
+Scenario closing(const char* name, double frames, double gap) {
+  const double half = 0.02, far = 0.1 + half, near = 0.5 * gap + half;
+  const auto slab = [&](double side) {
+    return solid("slab", {{6, Vec3(0, side * far, 0)}, {6 + frames, Vec3(0, side * near, 0)}},
+                 side > 0 ? "above" : "below");
+  };
+  return among(name, solids({slab(1), slab(-1)}), {{"slab", Vec3(0.3, half, 0.3)}},
+               (far - near) / std::max(frames / 24, kStep), (6 + frames) / 24, true);
+}
+// From 2 m away to where the hair is, within a substep.
+Scenario appearing(const char* name, const Vec3& half, const Vec3& place) {
+  return among(name, solids({solid("box", {{6, place + Vec3(0, 2, 0)}, {6.01, place}})}), {{"box", half}},
+               2 / kStep, 0.26, true);
+}
+// A needle 30 cm long across the hair.
+Scenario needle(const char* name, double radius, double speed) {
+  const double way = 0.3;
+  return among(name,
+               solids({solid("needle", {{6, Vec3(0.1, 0.5 * way, 0)},
+                                        {6 + 24 * way / speed, Vec3(0.1, -0.5 * way, 0)}})}),
+               {{"needle", Vec3(radius, radius, 0.3)}}, speed, 0.25 + way / speed, true);
+}
+Scenario inside(const char* name, const Vec3& half) {
+  return among(name, solids({solid("box", {{0, Vec3::Zero()}})}), {{"box", half}}, 0, 0, true);
+}
+// Hair that grows into its head.
+Scenario inside_out(const char* name, const char* penetration) {
+  Scenario scenario = among(name, solids({"{\"source\": \"head\", \"resolution\": 48}"}),
+                            {{"head", Vec3(0.15, 0.1, 0.15)}}, 0, 0, true);
+  for (Strand& strand : scenario.hair) {
+    const Vec3 root = strand[0];
+    for (Vec3& x : strand)
+      x = Vec3(root.x(), 0.1, root.z()) + Vec3(0.2 * x.x(), -(x - root).norm(), x.z() - root.z());
+  }
+  scenario.set.insert(scenario.set.begin(), {"/head={\"mesh\": \"head.obj\"}", "/groom/attach=\"nearest\"",
+                                             fmt::format("/groom/penetration=\"{}\"", penetration)});
+  return scenario;
+}
+
+const std::vector<Scenario> kSolids = {closing("slabs_close_to_4_mm", 6, 0.004),
+                                       closing("slabs_close_to_4_mm_in_a_frame", 1, 0.004),
+                                       closing("slabs_close_over_each_other", 6, -0.01),
+                                       appearing("box_appears_around_all", {0.4, 0.4, 0.4}, {0, 0, 0}),
+                                       needle("needle_of_2_mm_at_1_m_per_s", 0.001, 1),
+                                       needle("needle_of_half_a_mm_at_10_m_per_s", 0.00025, 10),
+                                       inside("inside_a_box", {0.4, 0.4, 0.4}),
+                                       inside_out("inside_out_pushed_out", "push_out")};
+
+// Mass springs that are pressed on skin against their rest shape tremble.
+const std::vector<Scenario> kBoxOnTips = {
+    appearing("box_appears_around_tips", {0.05, 0.05, 0.3}, {0.17, 0, 0})};
+INSTANTIATE_TEST_SUITE_P(SolidsInDouble, Stability,
+                         testing::ValuesIn(everywhere(kBoxOnTips, kStrandModels, {Machine::kDouble})),
+                         case_name);
+const std::vector<Scenario> kInsideOut = {inside_out("inside_out_kept", "keep")};
+
+INSTANTIATE_TEST_SUITE_P(SolidsOfAms, Stability, testing::ValuesIn(everywhere(kInsideOut, {Model::kAms})),
+                         case_name);
+INSTANTIATE_TEST_SUITE_P(Solids, Stability, testing::ValuesIn(everywhere(kSolids)), case_name);
+
+}  // namespace
+}  // namespace ringlet::stability

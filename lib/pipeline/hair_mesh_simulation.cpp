@@ -98,6 +98,7 @@ class HairMeshSimulation : public Simulation {
 
   void make_plan(std::int64_t strands, std::int64_t particles);
   void step_frame(int frame);
+  void warn_of_residual(int frame);
   void take_frame(int frame, int substeps);
   std::vector<double> vertices() const;
   void probe(int frame, int number);
@@ -132,6 +133,7 @@ class HairMeshSimulation : public Simulation {
   std::optional<effects::WindField> wind_;
   std::vector<Vec3> points_, speeds_;  // [particles] of the cache
   hairmesh::FrameFigures taken_;
+  bool warned_ = false;  // of a residual
   StageSeconds seconds_;
   std::optional<SubstepControl> control_;  // where the scene leaves the substeps to it
   std::function<void(const std::string&, int, int, state::Snapshot&)> probe_;
@@ -402,6 +404,19 @@ void HairMeshSimulation<T>::set_state(const state::Snapshot& snapshot) {
     parts_[k].body.restore(snapshot, k == 0 ? "" : fmt::format("_{}", k));
 }
 
+// Once: the figures tell of every frame.
+template <class T>
+void HairMeshSimulation<T>::warn_of_residual(int frame) {
+  const scene::HairMeshModel& model = *scene_.model.hair_mesh;
+  const double left = std::max(taken_.residual, taken_.minimise_residual);
+  if (warned_ || !(left > model.residual)) return;
+  warned_ = true;
+  log_warning(fmt::format(
+      "frame {}: a hair mesh's solve stopped at a relative residual of {:.2g}, {:g} was asked for "
+      "(more max_iterations, softer springs, or double precision)",
+      frame, left, model.residual));
+}
+
 template <class T>
 bool HairMeshSimulation<T>::run(const FrameRange& range, state::FrameSink& sink, const RunControl& control) {
   int frame = scene_.frames.first - scene_.frames.preroll;
@@ -433,6 +448,7 @@ bool HairMeshSimulation<T>::run(const FrameRange& range, state::FrameSink& sink,
     ++frame;
     span.tell("frame", frame);
     step_frame(frame);
+    warn_of_residual(frame);
     if (frame >= range.first) hand_on(timer.seconds());
     if (control.on_frame) control.on_frame(frame, timer.seconds(), seconds_);
     trace::flush();

@@ -73,6 +73,13 @@ def test_the_figures_tell_of_the_solves(program, scene, tmp_path):
     assert np.abs(figures(out, "mesh_volume") - 1).max() < 0.5
 
 
+def test_a_solve_that_is_cut_short_is_told_once(program, scene, tmp_path):
+    result = run(program, "run", scene, "-o", tmp_path / "out", "--set=/model/hair_mesh/max_iterations=1")
+    assert result.returncode == 0
+    assert result.stderr.count("a hair mesh's solve stopped at a relative residual of") == 1
+    assert figures(tmp_path / "out", "mesh_residual").max() > 1e-4
+
+
 def test_velocities_are_those_of_the_way(program, scene, tmp_path):
     out = tmp_path / "out"
     steps(program, scene, out, '--set=/cache/fields=["position", "velocity"]', "--set=/effects/solids=[]")

@@ -115,7 +115,6 @@ struct BlockPattern {
   const std::int32_t* first_pair;  // [columns + 1] of their blocks
 };
 
-// Everything that a solver copies when it is made. Vertices are numbered as by HairMeshTopology.
 // A place of the outer surface between vertices: the middle of an edge or a face.
 template <class T>
 struct MeshSample {
@@ -123,6 +122,7 @@ struct MeshSample {
   T span;                  // from the first of them to the farthest, at rest [m]
 };
 
+// Everything that a solver copies when it is made. Vertices are numbered as by HairMeshTopology.
 template <class T>
 struct HairMeshView {
   std::int32_t columns, layers;

@@ -104,7 +104,9 @@ class HairMeshSolver {
   // until the next `solve`. Solids are told of in the same order in every step.
   virtual MeshContactFigures collide(const MeshSurface<T>& surface) = 0;
   virtual MeshContactFigures collide(const MeshEllipsoid<T>* ellipsoids, std::int32_t count) = 0;
-  // Takes the rest of the mesh along with what was corrected since the last `solve`.
+  // Takes the rest of the mesh along with what was corrected since this was last called, once a frame:
+  // velocities change by the displacement over the time that has gone since. Each step of many would turn
+  // corrections however small into speeds.
   virtual SolveFigures minimise() = 0;
   // What is in contact, to go on from there another time. `contacts` has room for all vertices.
   virtual std::int32_t get_contacts(MeshContact<T>* contacts) const = 0;

@@ -55,7 +55,7 @@ class MeshStepper final : public HairMeshSolver<T> {
     copy_values(mass_, mesh.mass, count);
     zero_values(4 * (count + kBeyond), position_, velocity_, impulse_, change_, displacement_, rubbing_,
                 carried_, before_);
-    zero_values(count, held_), zero_values(count, holder_);
+    zero_values(count, held_), zero_values(count, holder_), zero_values(count, moved_in_);
     zero_values(count, contact_of_);
     roots_.resize(4 * static_cast<std::size_t>(columns_));
     contacts_.resize(count), corrected_.resize(count);
@@ -117,8 +117,9 @@ class MeshStepper final : public HairMeshSolver<T> {
     }
     if (held_roots_)  // to the last bit
       for (std::int32_t c = 0; c < columns_; ++c) position()[c * layers_] = vectors(roots_)[c];
-    forget_contacts(), forget_corrections();
-    solids_met_ = 0, depth_ = 0;
+    forget_contacts();
+    elapsed_ += step_, ++steps_;
+    solids_met_ = moved_count_ = 0, depth_ = 0;
     return figures;
   }
 
@@ -143,7 +144,10 @@ class MeshStepper final : public HairMeshSolver<T> {
   }
 
   SolveFigures minimise() override {
-    if (corrected_count_ == 0) return {};
+    if (corrected_count_ == 0) {
+      elapsed_ = T(0);
+      return {};
+    }
     filter_.clear();
     for (std::int32_t k = 0; k < corrected_count_; ++k) filter_.prescribe_wholly(corrected_.data()[k]);
     // What touches without having been moved stays where it is as well.
@@ -155,10 +159,8 @@ class MeshStepper final : public HairMeshSolver<T> {
     gradients_.multiply(laplacian_, u, left);
     for (std::int32_t i = 0; i < vertices_; ++i) left[i] = -left[i];
     const SolveFigures figures = gradients_.solve(laplacian_, filter_, tolerance_, iterations_, left, w);
-    const T per_step = T(1) / step_;
-    for (std::int32_t i = 0; i < vertices_; ++i) {
-      position()[i] += w[i], velocity()[i] += per_step * w[i];
-    }
+    const T per_time = T(1) / elapsed_;
+    for (std::int32_t i = 0; i < vertices_; ++i) position()[i] += w[i], velocity()[i] += per_time * w[i];
     forget_corrections();
     return figures;
   }
@@ -205,7 +207,8 @@ class MeshStepper final : public HairMeshSolver<T> {
                               sheets_.bytes() + bends_.bytes() + volumes_.bytes() + external_.bytes() +
                               samples_.bytes() + surface_.bytes();
     return total + mass_.bytes() + 8 * position_.bytes() + roots_.bytes() + filter_.bytes() +
-           corrected_.bytes() + held_.bytes() + holder_.bytes() + contact_of_.bytes() + contacts_.bytes();
+           corrected_.bytes() + held_.bytes() + holder_.bytes() + moved_in_.bytes() + contact_of_.bytes() +
+           contacts_.bytes();
   }
 
   const BlockMatrix<T>& matrix() const { return matrix_; }
@@ -281,72 +284,81 @@ class MeshStepper final : public HairMeshSolver<T> {
   }
   static RINGLET_KERNEL T square(Padded<T> a) { return dot_product(a, a); }
 
-  // A surface holds what it held, as far as it reaches. What is not under `thickness` wide cannot get in
-  // between vertices that are nearer to each other.
+  // A surface holds what it held, as far as it reaches. What is nowhere nearer to its middle than `radius`
+  // cannot get in between vertices that are nearer to each other.
   template <class Find>
-  void collide_with(const Find& find, T thickness) {
+  void collide_with(const Find& find, T radius) {
     const std::int32_t solid = solids_met_++;
     for (const std::int32_t i : external_) {
       MeshSurfacePoint<T> found;
       T before[3], point[3];
       store_three(before, vectors(before_)[i]), store_three(point, position()[i]);
-      const bool held =
-          (held_.data()[i] == kSlides || held_.data()[i] == kSticks) && holder_.data()[i] == solid;
-      if (!find(before, point, held ? reach_ : T(0), found)) continue;
+      if (!find(before, point, held_by(i, solid) ? reach_ : T(0), found)) continue;
       const Padded<T> n = padded(found.normal), out = padded(found.point) - position()[i];
       const T depth = dot_product(n, out);
       if (depth > T(0)) {
         depth_ = max(depth_, static_cast<double>(depth));
         correct(i, out);
       } else if (contact_of_.data()[i] != 0) {
-        continue;  // another has pushed it in this step
+        continue;  // another holds it in this step
       }
-      // One that was let go comes anew only where it moves into the surface: rounding may leave it inside.
-      if (held_.data()[i] == kReleased && !(dot_product(velocity()[i] - padded(found.velocity), n) < T(0)))
-        continue;
-      velocity()[i] = velocity_after_contact<T>(velocity()[i], padded(found.velocity), n, found.friction);
-      hold(i, solid, found);
+      touch(i, solid, found);
     }
     for (const MeshSample<T>& sample : samples_)
-      if (sample.span > thickness) collide_between(find, sample);
+      if (sample.span > radius) collide_between(find, solid, sample);
   }
-  // A sample that is deeper in a solid than chords of what is round are takes its vertices along, without
-  // approach from then on.
+  bool held_by(std::int32_t i, std::int32_t solid) const {
+    return (held_.data()[i] == kSlides || held_.data()[i] == kSticks) && holder_.data()[i] == solid;
+  }
+
+  // A sample that is deeper in a solid than chords of what is round are takes its vertices along, and the
+  // solid holds them as it does those that it touches itself.
   template <class Find>
-  void collide_between(const Find& find, const MeshSample<T>& sample) {
-    Padded<T> from{}, at{}, rate{};
+  void collide_between(const Find& find, std::int32_t solid, const MeshSample<T>& sample) {
+    Padded<T> from{}, at{};
     std::int32_t count = 0;
+    bool held = false;
     while (count < 4 && sample.vertex[count] >= 0) {
       const std::int32_t i = sample.vertex[count++];
-      from += vectors(before_)[i], at += position()[i], rate += velocity()[i];
+      from += vectors(before_)[i], at += position()[i];
+      held = held || held_by(i, solid);
     }
     const T share = T(1) / static_cast<T>(count), slack = T(0.15) * sample.span;
     MeshSurfacePoint<T> found;
     T before[3], point[3];
     store_three(before, share * from), store_three(point, share * at);
-    if (!find(before, point, -slack, found)) return;
+    if (!find(before, point, held ? reach_ - slack : -slack, found)) return;
     const Padded<T> n = padded(found.normal), out = padded(found.point) - slack * n - padded(point);
     const T depth = dot_product(n, out);
-    if (!(depth > T(0))) return;
-    depth_ = max(depth_, static_cast<double>(depth));
-    const T approach = min(dot_product(n, share * rate - padded(found.velocity)), T(0));
+    if (depth > T(0)) depth_ = max(depth_, static_cast<double>(depth));
     for (std::int32_t k = 0; k < count; ++k) {
-      correct(sample.vertex[k], out);
-      velocity()[sample.vertex[k]] -= approach * n;
+      if (depth > T(0)) correct(sample.vertex[k], out);
+      if (contact_of_.data()[sample.vertex[k]] == 0) touch(sample.vertex[k], solid, found);
     }
   }
-  MeshContactFigures contact_figures() const { return {contact_count_, corrected_count_, depth_}; }
+
+  void touch(std::int32_t i, std::int32_t solid, const MeshSurfacePoint<T>& found) {
+    const Padded<T> n = padded(found.normal);
+    // One that was let go comes anew only where it moves into the surface: rounding may leave it inside.
+    if (held_.data()[i] == kReleased && !(dot_product(velocity()[i] - padded(found.velocity), n) < T(0)))
+      return;
+    velocity()[i] = velocity_after_contact<T>(velocity()[i], padded(found.velocity), n, found.friction);
+    hold(i, solid, found);
+  }
+  MeshContactFigures contact_figures() const { return {contact_count_, moved_count_, depth_}; }
 
   void correct(std::int32_t i, Padded<T> out) {
     Padded<T>& u = vectors(displacement_)[i];
     const bool first = u[0] == 0 && u[1] == 0 && u[2] == 0;
     if (first) corrected_.data()[corrected_count_++] = i;
     position()[i] += out, u += out;
+    if (moved_in_.data()[i] == steps_) return;
+    moved_in_.data()[i] = steps_, ++moved_count_;
   }
   void forget_corrections() {
     for (std::int32_t k = 0; k < corrected_count_; ++k)
       vectors(displacement_)[corrected_.data()[k]] = Padded<T>{};
-    corrected_count_ = 0;
+    corrected_count_ = 0, elapsed_ = T(0);
   }
 
   // The last surface that a vertex meets holds it.
@@ -389,14 +401,18 @@ class MeshStepper final : public HairMeshSolver<T> {
   VertexFilter<T> filter_;
   FilteredConjugateGradients<T> gradients_;
   HostBuffer<T> mass_, position_, velocity_, impulse_, change_, displacement_, before_, roots_;
-  HostBuffer<std::int32_t> corrected_;   // since the last solve
+  HostBuffer<std::int32_t> corrected_;   // since they were last minimised
+  HostBuffer<std::int32_t> moved_in_;    // [vertices] the last step that did so
   HostBuffer<std::int32_t> contact_of_;  // [vertices] place in contacts_ plus 1; 0: none
   HostBuffer<char> held_;                // how a surface that pushed it held a vertex in the last solve
   HostBuffer<std::int32_t> holder_;      // which
   HostBuffer<MeshContact<T>> contacts_;
   HostBuffer<T> carried_;  // impulses that gave contacts their surface's velocity [N s]
   HostBuffer<T> rubbing_;  // [vertices] friction on those that slide [N]
-  std::int32_t contact_count_ = 0, corrected_count_ = 0, solids_met_ = 0;
+  // Steps taken, from 1, and of this one: solids that were told of, vertices that were moved.
+  std::int32_t steps_ = 1, solids_met_ = 0, moved_count_ = 0;
+  std::int32_t contact_count_ = 0, corrected_count_ = 0;
+  T elapsed_ = T(0);  // since corrections were last minimised [s]
   double depth_ = 0;  // of the deepest correction since the last solve [m]
 };
 

@@ -138,6 +138,31 @@ void Body<T>::assemble(double step, std::span<const Pose> roots, const Vec3& gra
 }
 
 template <class T>
+std::vector<kernels::MeshContact<T>> Body<T>::contacts() const {
+  std::vector<kernels::MeshContact<T>> contacts(positions_.size());
+  contacts.resize(static_cast<std::size_t>(solver_->get_contacts(contacts.data())));
+  return contacts;
+}
+
+template <class T>
+void Body<T>::carry(std::span<const kernels::SolidView> solids,
+                    const std::vector<kernels::MeshEllipsoid<T>>& ellipsoids, double step) {
+  std::vector<kernels::MeshContact<T>> all = contacts();
+  if (all.empty()) return;
+  for (kernels::MeshContact<T>& contact : all) {
+    const auto at = 3 * static_cast<std::size_t>(contact.vertex),
+               solid = static_cast<std::size_t>(contact.solid);
+    const Vec3 x(solver_positions_[at], solver_positions_[at + 1], solver_positions_[at + 2]);
+    if (solid >= solids.size() + ellipsoids.size()) continue;  // of a checkpoint of other solids
+    const Vec3 velocity = solid < solids.size()
+                              ? carrying_velocity(solids[solid], origin_ + x, step)
+                              : carrying_velocity(ellipsoids[solid - solids.size()], x, step);
+    for (int k = 0; k < 3; ++k) contact.velocity[k] = static_cast<T>(velocity[k]);
+  }
+  solver_->set_contacts(all.data(), static_cast<std::int32_t>(all.size()));
+}
+
+template <class T>
 void Body<T>::solve(FrameFigures& figures) {
   const kernels::SolveFigures took = solver_->solve();
   figures.solves += 1, figures.iterations += took.iterations;
@@ -148,16 +173,13 @@ void Body<T>::solve(FrameFigures& figures) {
 template <class T>
 void Body<T>::collide(std::span<const kernels::SolidView> solids,
                       const std::vector<kernels::MeshEllipsoid<T>>& ellipsoids, FrameFigures& figures) {
-  kernels::MeshContactFigures all;
-  const auto add = [&](const kernels::MeshContactFigures& some) {
-    all.touched += some.touched, all.corrected += some.corrected, all.depth = std::max(all.depth, some.depth);
-  };
+  kernels::MeshContactFigures all;  // each call tells of all so far
   for (const kernels::SolidView& solid : solids) {
     const SolidCollider<T> collider(solid, origin_, step_);
-    add(solver_->collide(kernels::mesh_surface<T>(collider)));
+    all = solver_->collide(kernels::mesh_surface<T>(collider));
   }
   if (!ellipsoids.empty())
-    add(solver_->collide(ellipsoids.data(), static_cast<std::int32_t>(ellipsoids.size())));
+    all = solver_->collide(ellipsoids.data(), static_cast<std::int32_t>(ellipsoids.size()));
   figures.touched = std::max(figures.touched, static_cast<double>(all.touched));
   figures.corrected = std::max(figures.corrected, static_cast<double>(all.corrected));
   figures.depth = std::max(figures.depth, all.depth);
@@ -194,6 +216,18 @@ std::optional<MeshDivergence> Body<T>::diverged(const scene::Limits& limits) con
 }
 
 template <class T>
+std::optional<MeshDivergence> Body<T>::bad_contact() const {
+  for (const kernels::MeshContact<T>& contact : contacts()) {
+    T sum = contact.friction;
+    for (int c = 0; c < 3; ++c) sum += contact.normal[c] + contact.velocity[c] + contact.force[c];
+    if (!std::isfinite(sum))
+      return MeshDivergence{static_cast<std::size_t>(contact.vertex / layers_), contact.vertex % layers_,
+                            "a value of its contact is not finite"};
+  }
+  return std::nullopt;
+}
+
+template <class T>
 double Body<T>::strain() const {
   double most = 0;
   for (std::size_t v = columns_; v < positions_.size(); ++v)
@@ -219,11 +253,9 @@ std::size_t Body<T>::bytes() const {
 
 template <class T>
 void Body<T>::save(state::Snapshot& snapshot, const std::string& suffix) const {
-  std::vector<kernels::MeshContact<T>> contacts(positions_.size());
-  contacts.resize(static_cast<std::size_t>(solver_->get_contacts(contacts.data())));
   snapshot.arrays["mesh_position" + suffix] = bytes_of(solver_positions_);
   snapshot.arrays["mesh_velocity" + suffix] = bytes_of(solver_velocities_);
-  snapshot.arrays["mesh_contacts" + suffix] = bytes_of(contacts);
+  snapshot.arrays["mesh_contacts" + suffix] = bytes_of(contacts());
 }
 
 template <class T>

@@ -47,6 +47,10 @@ class Body {
   // Each column at rest in its root's frame, or collapsed onto its root; nothing moves.
   void start(std::span<const Pose> roots);
 
+  // What holds vertices carries them as it will move in the substep that comes; the solids and ellipsoids as
+  // `collide` will be told of them.
+  void carry(std::span<const kernels::SolidView> solids,
+             const std::vector<kernels::MeshEllipsoid<T>>& ellipsoids, double step);
   // One substep in four parts, each of which can be timed. `roots`: at its end; `air`: the air's velocity at
   // every vertex [m/s], empty where it is still.
   void assemble(double step, std::span<const Pose> roots, const Vec3& gravity, std::span<const Vec3> air);
@@ -56,6 +60,8 @@ class Body {
   void minimise(FrameFigures& figures);
 
   std::optional<MeshDivergence> diverged(const scene::Limits& limits) const;
+  // A contact that remembers what is not finite.
+  std::optional<MeshDivergence> bad_contact() const;
 
   const std::vector<Vec3>& positions() const { return positions_; }
   const std::vector<Vec3>& velocities() const { return velocities_; }
@@ -74,6 +80,7 @@ class Body {
   void restore(const state::Snapshot& snapshot, const std::string& suffix);
 
  private:
+  std::vector<kernels::MeshContact<T>> contacts() const;
   std::size_t solver_index(std::size_t column, int layer) const { return column * layers_ + layer; }
   void fetch();
   void hand_over();

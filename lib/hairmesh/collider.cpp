@@ -76,8 +76,30 @@ kernels::MeshEllipsoid<T> moving_ellipsoid(const scene::Ellipsoid& rest, const P
   return ellipsoid;
 }
 
+Vec3 carrying_velocity(const kernels::SolidView& solid, const Vec3& x, double step) {
+  const Vector3<double> away{x.x() - solid.translation_before[0], x.y() - solid.translation_before[1],
+                             x.z() - solid.translation_before[2]},
+      local = kernels::rotate_back(solid.rotation_before, away);
+  const SurfaceSample<double> at = kernels::sample_surface(solid, local, kernels::Patch{});
+  if (!at.exact) return Vec3::Zero();
+  const Vector3<double> way = kernels::surface_displacement(solid, at);
+  return Vec3(way.x, way.y, way.z) / step;
+}
+
+template <class T>
+Vec3 carrying_velocity(const kernels::MeshEllipsoid<T>& e, const Vec3& x, double step) {
+  const Vec3 centre(e.centre[0], e.centre[1], e.centre[2]),
+      velocity(e.velocity[0], e.velocity[1], e.velocity[2]), half(e.turn[0], e.turn[1], e.turn[2]);
+  const Eigen::Quaterniond turn(std::sqrt(std::max(0.0, 1 - half.squaredNorm())), half.x(), half.y(),
+                                half.z());
+  const Vec3 arm = x - (centre - step * velocity);
+  return velocity + (turn * arm - arm) / step;
+}
+
 template class SolidCollider<float>;
 template class SolidCollider<double>;
+template Vec3 carrying_velocity(const kernels::MeshEllipsoid<float>&, const Vec3&, double);
+template Vec3 carrying_velocity(const kernels::MeshEllipsoid<double>&, const Vec3&, double);
 template kernels::MeshEllipsoid<float> moving_ellipsoid(const scene::Ellipsoid&, const Pose&, const Pose&,
                                                         const Vec3&, double);
 template kernels::MeshEllipsoid<double> moving_ellipsoid(const scene::Ellipsoid&, const Pose&, const Pose&,

@@ -25,6 +25,12 @@ class SolidCollider {
   double step_;
 };
 
+// How fast a solid will carry what is at x [m] on its surface at the substep's start [m/s].
+Vec3 carrying_velocity(const kernels::SolidView& solid, const Vec3& x, double step);
+// The same of an ellipsoid, with x against the solver's origin.
+template <class T>
+Vec3 carrying_velocity(const kernels::MeshEllipsoid<T>& ellipsoid, const Vec3& x, double step);
+
 // An ellipsoid that was carried from `before` to `now` by a substep of `step` [s].
 template <class T>
 kernels::MeshEllipsoid<T> moving_ellipsoid(const scene::Ellipsoid& rest, const Pose& before, const Pose& now,

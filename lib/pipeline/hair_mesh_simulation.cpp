@@ -27,7 +27,8 @@ struct Part {
   const groom::HairMeshStrands& strands;
   Roots roots;  // of the mesh's columns
   std::vector<Pose> poses;
-  std::vector<Vec3> air;  // [vertices] [m/s]; empty: still
+  std::vector<Vec3> air;                              // [vertices] [m/s]; empty: still
+  std::vector<kernels::MeshEllipsoid<T>> ellipsoids;  // as they move in the substep
   hairmesh::Body<T> body;
   std::int64_t first_strand, first_particle;  // in the cache
 };
@@ -49,7 +50,7 @@ Part<T> make_part(const scene::Scene& scene, const World& world, std::size_t ind
   hairmesh::Body<T> body(mesh, *scene.model.hair_mesh, poses, set);
   log_info(fmt::format("groom \"{}\": hair mesh of {} faces, {} layers, {} vertices, {} prisms", desc.name,
                        mesh.faces.size(), mesh.layers, mesh.positions.size(), mesh.prisms()));
-  return {strands, std::move(roots), std::move(poses), {}, std::move(body), 0, 0};
+  return {strands, std::move(roots), std::move(poses), {}, {}, std::move(body), 0, 0};
 }
 
 template <class T>
@@ -102,13 +103,12 @@ class HairMeshSimulation : public Simulation {
   void take_frame(int frame, int substeps);
   std::vector<double> vertices() const;
   void probe(int frame, int number);
-  void substep(int frame, double before, double now);
+  void substep(int frame, double before, double now, bool last);
   void blow(double time);
-  void collide(double before, double now);
+  void move_solids(double before, double now);
   Pose head_at(double time) const;
   Pose carrier(const scene::Ellipsoid& ellipsoid, const Pose& head, double time) const;
   void check(const char* stage, int frame);
-  std::optional<hairmesh::MeshDivergence> bad_contact(std::size_t part) const;
   [[noreturn]] void tell(const char* stage, int frame, std::size_t part,
                          const hairmesh::MeshDivergence& diverged);
   state::Frame frame_now(int frame);
@@ -131,7 +131,8 @@ class HairMeshSimulation : public Simulation {
   World world_;
   std::vector<Part<T>> parts_;
   std::optional<effects::WindField> wind_;
-  std::vector<Vec3> points_, speeds_;  // [particles] of the cache
+  std::vector<Vec3> points_, speeds_;      // [particles] of the cache
+  std::vector<kernels::SolidView> views_;  // of the solids, as they move in the substep
   hairmesh::FrameFigures taken_;
   bool warned_ = false;  // of a residual
   StageSeconds seconds_;
@@ -197,28 +198,29 @@ Pose HairMeshSimulation<T>::carrier(const scene::Ellipsoid& ellipsoid, const Pos
 }
 
 template <class T>
-void HairMeshSimulation<T>::collide(double before, double now) {
-  std::vector<kernels::SolidView> views;
-  for (solids::Solid& solid : world_.solids) views.push_back(solid.at(before, now));
+void HairMeshSimulation<T>::move_solids(double before, double now) {
+  views_.clear();
+  for (solids::Solid& solid : world_.solids) views_.push_back(solid.at(before, now));
   const auto& ellipsoids = scene_.model.hair_mesh->ellipsoids;
   const Pose head_before = ellipsoids.empty() ? Pose{} : head_at(before),
              head_now = ellipsoids.empty() ? Pose{} : head_at(now);
   for (Part<T>& part : parts_) {
-    std::vector<kernels::MeshEllipsoid<T>> moving;
+    part.ellipsoids.clear();
     for (const scene::Ellipsoid& ellipsoid : ellipsoids)
-      moving.push_back(hairmesh::moving_ellipsoid<T>(ellipsoid, carrier(ellipsoid, head_before, before),
-                                                     carrier(ellipsoid, head_now, now), part.body.origin(),
-                                                     now - before));
-    part.body.collide(views, moving, taken_);
+      part.ellipsoids.push_back(
+          hairmesh::moving_ellipsoid<T>(ellipsoid, carrier(ellipsoid, head_before, before),
+                                        carrier(ellipsoid, head_now, now), part.body.origin(), now - before));
+    part.body.carry(views_, part.ellipsoids, now - before);
   }
 }
 
 template <class T>
-void HairMeshSimulation<T>::substep(int frame, double before, double now) {
+void HairMeshSimulation<T>::substep(int frame, double before, double now, bool last) {
   timed("roots", [&] {
     for (Part<T>& part : parts_) part.roots.pose(now, part.poses);
   });
   if (wind_) timed("wind", [&] { blow(now); });
+  if (has_solids()) timed("solids", [&] { move_solids(before, now); });
   const Vec3 gravity = scene_.effects.gravity.value_or(Vec3::Zero());
   timed("forces", [&] {
     for (Part<T>& part : parts_) part.body.assemble(now - before, part.poses, gravity, part.air);
@@ -228,12 +230,14 @@ void HairMeshSimulation<T>::substep(int frame, double before, double now) {
   });
   check("solve", frame);
   if (!has_solids()) return;
-  timed("solids", [&] { collide(before, now); });
+  timed("solids", [&] {
+    for (Part<T>& part : parts_) part.body.collide(views_, part.ellipsoids, taken_);
+  });
   check("solids", frame);
-  if (scene_.model.hair_mesh->deformation_minimisation)
-    timed("minimisation", [&] {
-      for (Part<T>& part : parts_) part.body.minimise(taken_);
-    });
+  if (!last || !scene_.model.hair_mesh->deformation_minimisation) return;
+  timed("minimisation", [&] {
+    for (Part<T>& part : parts_) part.body.minimise(taken_);
+  });
   check("minimisation", frame);
 }
 
@@ -259,7 +263,7 @@ void HairMeshSimulation<T>::take_frame(int frame, int substeps) {
     trace::Span span("substep");
     span.tell("frame", frame), span.tell("substep", s);
     probe(frame, s);
-    substep(frame, time_of(frame - 1, s, substeps), time_of(frame - 1, s + 1, substeps));
+    substep(frame, time_of(frame - 1, s, substeps), time_of(frame - 1, s + 1, substeps), s + 1 == substeps);
   }
 }
 
@@ -280,31 +284,11 @@ void HairMeshSimulation<T>::probe(int frame, int number) {
   check("start", frame);
 }
 
-// A contact that remembers what is not finite.
-template <class T>
-std::optional<hairmesh::MeshDivergence> HairMeshSimulation<T>::bad_contact(std::size_t k) const {
-  if (!has_solids()) return std::nullopt;
-  state::Snapshot remembered;
-  parts_[k].body.save(remembered, "");
-  const std::vector<std::byte>& bytes = remembered.arrays.at("mesh_contacts");
-  std::vector<kernels::MeshContact<T>> contacts(bytes.size() / sizeof(kernels::MeshContact<T>));
-  std::memcpy(contacts.data(), bytes.data(), bytes.size());
-  const int layers = world_.hair_meshes[k].mesh.layers;
-  for (const kernels::MeshContact<T>& contact : contacts) {
-    T sum = contact.friction;
-    for (int c = 0; c < 3; ++c) sum += contact.normal[c] + contact.velocity[c] + contact.force[c];
-    if (std::isfinite(sum)) continue;
-    const auto column = static_cast<std::size_t>(contact.vertex / layers);
-    return hairmesh::MeshDivergence{column, contact.vertex % layers, "a value of its contact is not finite"};
-  }
-  return std::nullopt;
-}
-
 template <class T>
 void HairMeshSimulation<T>::check(const char* stage, int frame) {
   for (std::size_t k = 0; k < parts_.size(); ++k) {
     if (const auto diverged = parts_[k].body.diverged(scene_.limits)) tell(stage, frame, k, *diverged);
-    if (const auto contact = bad_contact(k)) tell(stage, frame, k, *contact);
+    if (const auto contact = parts_[k].body.bad_contact()) tell(stage, frame, k, *contact);
   }
   if (!std::isfinite(taken_.residual) || !std::isfinite(taken_.minimise_residual))
     throw Diverged(frame_now(frame), stage, parts_[0].first_strand, -1,
@@ -409,7 +393,7 @@ template <class T>
 void HairMeshSimulation<T>::warn_of_residual(int frame) {
   const scene::HairMeshModel& model = *scene_.model.hair_mesh;
   const double left = std::max(taken_.residual, taken_.minimise_residual);
-  if (warned_ || !(left > model.residual)) return;
+  if (warned_ || !(left > 2 * model.residual)) return;  // not of rounding
   warned_ = true;
   log_warning(fmt::format(
       "frame {}: a hair mesh's solve stopped at a relative residual of {:.2g}, {:g} was asked for "

@@ -81,7 +81,7 @@ bool run_to_end(pipeline::Simulation& simulation, const pipeline::FrameRange& ra
 int run_run(const RunOptions& options) {
   const std::atomic<int>& stop = catch_signals();
   std::optional<trace::Recording> recording;  // outlives whatever is recorded
-  if (!options.trace.empty()) recording.emplace(options.trace);
+  if (!options.trace.empty()) trace::check_destination(options.trace), recording.emplace();
   trace::name_thread("stepping");
   const scene::Scene scene = load_scene(options.scene);
   const pipeline::FrameRange range = parse_range(options.frames, scene.frames);
@@ -98,6 +98,7 @@ int run_run(const RunOptions& options) {
   const auto simulation = make_simulation(scene, options.scene.options);
   const state::RunHeader header = simulation->header(range);
   cache::CacheWriter writer(output, header, writer_options(scene, existing));
+  if (recording) recording->open(options.trace);
   const auto progress = make_progress(options.progress, range.last);
   pipeline::RunControl control;
   control.resume = writer.take_resume_point();

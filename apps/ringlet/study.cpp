@@ -71,6 +71,7 @@ void check_destination(const std::filesystem::path& directory, const StudyOption
 void print(const study::Study& study, const std::filesystem::path& directory) {
   const study::Answers answers = study::answer(study);
   fmt::print("\n{}\n", study::table(study));
+  if (!study::reference_converges(study)) fmt::print("the reference does not converge: no answers\n");
   if (answers.digit_cost)
     fmt::print("a tenth of the error takes {:.3g} times as long\n", *answers.digit_cost);
   if (answers.knee) fmt::print("the knee is {}\n", study.rows[*answers.knee].label);

@@ -6,6 +6,7 @@
 
 #include <cerrno>
 #include <cmath>
+#include <fstream>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <system_error>
@@ -40,11 +41,11 @@ struct Recorder {
 
   void add(const std::string& event) {
     const std::lock_guard lock(mutex);
-    if (file < 0) return;
+    if (!on()) return;
     pending += first ? "" : ",\n";
     pending += event;
     first = false;
-    if (pending.size() > kMostPending) write_pending();
+    if (file >= 0 && pending.size() > kMostPending) write_pending();
   }
 
   void write_pending() {
@@ -79,19 +80,44 @@ std::string event(char phase, std::string_view name, double time, const std::str
                      quoted(name), thread_number(), time, more);
 }
 
+[[noreturn]] void refuse_to_write(const std::filesystem::path& path, int error) {
+  throw Error(ErrorKind::kIo, path.string(), "cannot be written: " + std::generic_category().message(error),
+              "choose another file with --trace");
+}
+
 }  // namespace
 
-Recording::Recording(const std::filesystem::path& path) {
+void check_destination(const std::filesystem::path& path) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  const bool there = fs::exists(path, error);
+  if (fs::is_directory(path, error)) refuse_to_write(path, EISDIR);
+  const fs::path parent = path.has_parent_path() ? path.parent_path() : fs::path(".");
+  if (::access((there ? path : parent).c_str(), W_OK) != 0) refuse_to_write(path, errno);
+  if (!there || !fs::is_regular_file(path, error) || fs::file_size(path, error) == 0) return;
+  std::ifstream stream(path, std::ios::binary);
+  std::string head(kHead.size(), '\0');
+  stream.read(head.data(), static_cast<std::streamsize>(head.size()));
+  if (!stream || head != kHead)
+    throw Error(ErrorKind::kUsage, path.string(), "is there and is no trace of this program",
+                "choose another file with --trace, or remove this one");
+}
+
+Recording::Recording() {
   Recorder& to = recorder();
   const std::lock_guard lock(to.mutex);
-  to.file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-  if (to.file < 0)
-    throw Error(ErrorKind::kIo, path.string(), "cannot be written: " + std::generic_category().message(errno),
-                "choose another file with --trace");
-  to.path = path, to.clock = Timer(), to.length = 0, to.first = true, to.error = 0;
+  to.clock = Timer(), to.length = 0, to.first = true, to.error = 0;
   to.pending = kHead;
-  to.write_pending();
   internal::recording = true;
+}
+
+void Recording::open(const std::filesystem::path& path) {
+  Recorder& to = recorder();
+  const std::lock_guard lock(to.mutex);
+  to.path = path;
+  to.file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  if (to.file < 0) refuse_to_write(path, errno);
+  to.write_pending();
 }
 
 Recording::~Recording() {
@@ -106,7 +132,7 @@ void Recording::finish() {
   Recorder& to = recorder();
   const std::lock_guard lock(to.mutex);
   internal::recording = false;
-  if (to.file < 0) return;
+  if (to.file < 0) return to.pending.clear();
   to.write_pending();
   if (::close(std::exchange(to.file, -1)) != 0 && to.error == 0) to.error = errno;
   if (to.error != 0)

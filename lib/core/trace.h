@@ -17,15 +17,21 @@ extern std::atomic<bool> recording;
 
 inline bool on() { return internal::recording.load(std::memory_order_relaxed); }
 
-// Records into a file while it lives; one at a time. Whatever becomes of the program, the file is whole JSON
-// as of the last `flush`.
+// Throws what a trace cannot be recorded into the file for, and leaves the file as it is: Error{kUsage} for
+// one that is there and holds something else than a trace of this program, Error{kIo} where none can be
+// written.
+void check_destination(const std::filesystem::path& file);
+
+// Records while it lives; one at a time. What is recorded stays in memory until `open` gives it a file.
+// Whatever becomes of the program from then on, the file is whole JSON as of the last `flush`.
 class Recording {
  public:
-  explicit Recording(const std::filesystem::path& file);  // throws Error{kIo}
+  Recording();
   ~Recording();
   Recording(const Recording&) = delete;
   Recording& operator=(const Recording&) = delete;
-  void finish();  // throws Error{kIo} where not all of it could be written
+  void open(const std::filesystem::path& file);  // replaces the file; throws Error{kIo}
+  void finish();                                 // throws Error{kIo} where not all of it could be written
 };
 
 // From its construction to its destruction, `category` being what viewers filter by.
@@ -61,7 +67,7 @@ void count(std::string_view name, std::initializer_list<std::pair<std::string_vi
 // Names the calling thread.
 void name_thread(std::string_view name);
 
-// Brings what was recorded so far into the file.
+// Brings what was recorded so far into the file, where there is one.
 void flush();
 
 }  // namespace ringlet::trace

@@ -73,7 +73,7 @@ class HairMeshSimulation : public Simulation {
       wind_.emplace(*scene_.effects.wind, scene_.frames, parts_[0].body.origin());
       for (Part<T>& part : parts_) part.air.resize(part.body.positions().size());
     }
-    if (scene_.model.substep_choice) control_.emplace(*scene_.model.substep_choice, mean_length(world_));
+    if (scene_.model.substep_choice) control_.emplace(scene_, mean_length(world_));
     make_plan(strands, particles);
   }
 

@@ -115,7 +115,7 @@ class TypedSimulation : public Simulation {
         executor_(make_executor(model_, options_)),
         before_(roots_.strands()),
         now_(roots_.strands()) {
-    if (scene_.model.substep_choice) control_.emplace(*scene_.model.substep_choice, mean_length(world_));
+    if (scene_.model.substep_choice) control_.emplace(scene_, mean_length(world_));
     if (scene_.effects.wind)
       stages_.push_back(
           effects::make_wind_stage<T>(scene_, world_.head.get(), roots_.centre(), model_, state_));

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <mutex>
+#include <set>
 
 #include "core/error.h"
 #include "core/log.h"
@@ -18,16 +20,32 @@ namespace {
 constexpr double kAim = 0.7;  // of the tolerance, that the next frame's error should be
 constexpr const char* kName = "substeps";
 
+double expected_order(const scene::Effects& effects) {
+  return effects.inextensible || effects.hair_hair || !effects.solids.empty() ? 0.5 : 1;
+}
+
 double change(const std::vector<double>& from, const std::vector<double>& to, double particles) {
   double square = 0;
   for (std::size_t k = 0; k < to.size(); ++k) square += (to[k] - from[k]) * (to[k] - from[k]);
   return std::sqrt(square / particles);
 }
 
+// A study takes the same run several times: a warning of the same words is given once.
+void warn_once(const std::string& message) {
+  static std::mutex mutex;
+  static std::set<std::string> given;
+  const std::lock_guard lock(mutex);
+  if (given.insert(message).second) log_warning(message);
+}
+
 }  // namespace
 
-SubstepControl::SubstepControl(const scene::SubstepChoice& choice, double length)
-    : choice_(choice), length_(length > 0 ? length : 1), least_(std::max(choice.min, 2)), next_(least_) {}
+SubstepControl::SubstepControl(const scene::Scene& scene, double length)
+    : choice_(*scene.model.substep_choice),
+      length_(length > 0 ? length : 1),
+      order_(expected_order(scene.effects)),
+      least_(std::max(choice_.min, 2)),
+      next_(least_) {}
 
 std::vector<int> SubstepControl::tries(int second) const {
   std::vector<int> tries = {(std::min(second, choice_.max) + 1) / 2};
@@ -48,23 +66,25 @@ void SubstepControl::step(int frame, double particles, const Try& take) {
       now = take(substeps);
     } catch (const Diverged&) {
       if (substeps == choice_.max) throw;
+      error_ = kUnknown;
     }
     if (!before.empty() && !now.empty())
-      error_ = change(before, now, particles) / length_ * substeps_ / (substeps - substeps_);
+      error_ = change(before, now, particles) / length_ /
+               (std::pow(static_cast<double>(substeps) / substeps_, order_) - 1);
     substeps_ = substeps, before = std::move(now);
     span.tell("error", error_);
     if (error_ <= choice_.tolerance) break;
   }
-  const double wanted = substeps_ * error_ / (kAim * choice_.tolerance);
+  const double wanted = substeps_ * std::pow(error_ / (kAim * choice_.tolerance), 1 / order_);
   next_ = static_cast<int>(std::ceil(std::clamp(wanted, 0.5 * substeps_, 2.0 * substeps_)));
   next_ = std::clamp(next_, least_, choice_.max);
   if (error_ <= choice_.tolerance || told_) return;
   told_ = true;
-  log_warning(fmt::format(
-      "frame {}: {} substeps, the most there may be, leave an error of {:.2g} of the strands' length, "
-      "above the tolerance of {:.2g} (a larger /model/substeps/max would do); later frames' are in the "
-      "cache's figures",
-      frame, substeps_, error_, choice_.tolerance));
+  const std::string error = std::isfinite(error_) ? fmt::format("of {:.2g}", error_) : "that is not known";
+  warn_once(fmt::format(
+      "frame {}: {} substeps, the most there may be, leave an error {} of the strands' length, above the "
+      "tolerance of {:.2g} (a larger /model/substeps/max would do); later frames' are in the cache's figures",
+      frame, substeps_, error, choice_.tolerance));
 }
 
 state::Figures SubstepControl::figures() const {

@@ -1,9 +1,9 @@
 // How many substeps each frame takes, where the scene gives the error that they may leave in their place.
 //
-// Step doubling. A frame is taken from its start with n substeps and with m = 2 n; of a method of first order
-// the errors of position are C / n and C / m, so what the second try leaves is
+// Step doubling. A frame is taken from its start with n substeps and with m = 2 n; of a method of order p the
+// errors of position are C / n^p and C / m^p, so what the second try leaves is
 //
-//   e = |x_m - x_n| n / (m - n)        [root mean square over the particles, over the strands' mean length]
+//   e = |x_m - x_n| / ((m / n)^p - 1)  [root mean square over the particles, over the strands' mean length]
 //
 // The second try is kept where e is within the tolerance, or m the most that there may be; else it is the
 // first of the next two. The next frame begins with the m that would have led to an e a little under the
@@ -17,10 +17,13 @@
 
 namespace ringlet::pipeline {
 
+// The strands' step is of order 1. What acts on positions or velocities beside it (lengths held, solids, hair
+// against hair) makes errors fall more slowly while the stiffest springs are not resolved: of scenes with any
+// of these order 1/2 is assumed. Where errors fall more slowly than that, more than e is left.
 class SubstepControl {
  public:
-  // `length`: the strands' mean length at rest [m]
-  SubstepControl(const scene::SubstepChoice& choice, double length);
+  // `scene`: one that leaves the choice; `length`: the strands' mean length at rest [m]
+  SubstepControl(const scene::Scene& scene, double length);
 
   // Takes a frame from its start in so many substeps; the positions that this led to, in any fixed order
   // [m]. Throws Diverged.
@@ -44,7 +47,7 @@ class SubstepControl {
 
  private:
   scene::SubstepChoice choice_;
-  double length_;
+  double length_, order_;  // order_: p
   int least_;
   int next_;  // substeps that the next frame's second try should have
   int substeps_ = 0, tried_ = 0;

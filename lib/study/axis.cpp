@@ -101,6 +101,9 @@ Axis parse_axis(const std::string& text) {
   if (equals == std::string::npos)
     refuse(text, "expected POINTER=V1,V2,...", "for instance /model/substeps=1,2,4,8");
   Axis axis{text.substr(0, equals), {}};
+  if (axis.name == "/frames" || axis.name.starts_with("/frames/"))
+    refuse(text, "frames of the same number would be of different times, which are not compared",
+           "--frames takes other frames, --set other times for all runs");
   for (const std::string& part : split(text.substr(equals + 1))) {
     if (part.empty()) refuse(text, "an empty value", "null leaves a setting out; \"\" is the empty string");
     const Taken setting = taken(axis.name, part);

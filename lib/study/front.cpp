@@ -9,6 +9,7 @@ namespace ringlet::study {
 namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 bool usable(const Point& point) { return std::isfinite(point.milliseconds) && std::isfinite(point.error); }
 
@@ -58,14 +59,16 @@ std::optional<std::size_t> knee(const std::vector<Point>& points, const std::vec
 }
 
 std::optional<double> digit_cost(const std::vector<Point>& points, const std::vector<std::size_t>& front) {
-  double n = 0, x = 0, y = 0, xx = 0, xy = 0;
+  constexpr double kLeast = 0.05;  // digits
+  double n = 0, x = 0, y = 0, xx = 0, xy = 0, fewest = kInfinity, most = -kInfinity;
   for (const std::size_t k : front) {
     if (!(points[k].error > 0) || !(points[k].milliseconds > 0)) continue;
     const double digits = -std::log10(points[k].error), time = std::log10(points[k].milliseconds);
+    fewest = std::min(fewest, digits), most = std::max(most, digits);
     n += 1, x += digits, y += time, xx += digits * digits, xy += digits * time;
   }
   const double spread = n * xx - x * x;
-  if (n < 2 || !(spread > 0)) return std::nullopt;
+  if (n < 2 || !(spread > 0) || !(most - fewest >= kLeast)) return std::nullopt;
   return std::pow(10.0, (n * xy - x * y) / spread);
 }
 

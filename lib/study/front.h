@@ -28,7 +28,8 @@ std::optional<std::size_t> dominating(const std::vector<Point>& points, const st
 std::optional<std::size_t> knee(const std::vector<Point>& points, const std::vector<std::size_t>& front);
 
 // How many times as long a tenth of the error takes, along the front: the slope of the least squares line
-// through its points with an error above 0 in logarithmic axes. Nothing of fewer than two such errors.
+// through its points with an error above 0 in logarithmic axes. Nothing of fewer than two such errors, nor
+// where all lie within a twentieth of a digit, which says nothing about a whole one.
 std::optional<double> digit_cost(const std::vector<Point>& points, const std::vector<std::size_t>& front);
 
 // The same between two points.

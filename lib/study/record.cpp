@@ -77,6 +77,7 @@ Out reference_json(const Study& study) {
           {"converged", study.reference_converged},
           {"resolution", study.resolution},
           {"levels", levels},
+          {"level_begun", study.level_begun},
           {"float_error",
            {{"substeps", study.single.substeps},
             {"message", study.single.message},
@@ -159,6 +160,26 @@ std::vector<std::string> all_stages(const Study& study) {
   return names;
 }
 
+Json parse_study(const std::string& text, const std::string& file) {
+  Json json = parse_json(text, file);
+  if (!json.is_object() || json.value("format", Json()) != "ringlet-study")
+    throw Error(ErrorKind::kInput, file, "is no study", "-o takes another directory");
+  return json;
+}
+
+void expect_identity(const Json& found, const Json& expected, const std::string& file) {
+  std::string differing;
+  for (const auto& [name, value] : expected.items()) {
+    const Json theirs = found.value(name, Json());
+    if (theirs != value)
+      differing += (differing.empty() ? "" : ", ") + name + " is " + theirs.dump() + " there and " +
+                   value.dump() + " here";
+  }
+  if (!differing.empty())
+    throw Error(ErrorKind::kUsage, file, "is of a study that cannot be gone on with: " + differing,
+                "--overwrite replaces it, -o takes another directory");
+}
+
 }  // namespace
 
 const char* to_string(Status status) {
@@ -200,8 +221,16 @@ std::string to_csv(const Study& study) {
   add("ms_per_frame");
   for (const auto& [name, value] : Errors{}.named()) add(name + "_rms"), add(name + "_p99");
   for (const std::string& stage : stages) add("ms_" + stage);
-  for (const char* name : {"strands", "particles", "strands_compared", "precision", "backend", "status"})
-    add(name);
+  for (const char* name : {"strands", "particles", "strands_compared"}) add(name);
+  // Those that are varied have their columns already.
+  const auto varied = [&](const char* name) {
+    return std::any_of(study.axes.begin(), study.axes.end(),
+                       [&](const Axis& axis) { return axis.name == name; });
+  };
+  const bool precision = !varied("precision"), backend = !varied("backend");
+  if (precision) add("precision");
+  if (backend) add("backend");
+  add("status");
   text += "\n";
   for (const Row& row : study.rows) {
     if (row.status == Status::kNew) continue;
@@ -220,17 +249,18 @@ std::string to_csv(const Study& study) {
     }
     add(std::to_string(row.measured.strands)), add(std::to_string(row.measured.particles));
     add(std::to_string(row.measured.errors.strands));
-    add(row.precision), add(row.measured.backend), add(to_string(row.status));
+    if (precision) add(row.precision);
+    if (backend) add(row.measured.backend);
+    add(to_string(row.status));
     text += "\n";
   }
   return text;
 }
 
 int take_over(const std::string& text, const std::string& file, Study& study) {
-  const Json json = parse_json(text, file);
+  const Json json = parse_study(text, file);
   try {
-    if (json.at("format") != "ringlet-study") throw Error(ErrorKind::kInput, file, "is no study");
-    if (json.at("identity") != Json::parse(study.identity)) return -1;
+    expect_identity(json.at("identity"), Json::parse(study.identity), file);
     int rows = 0;
     const Out ordered = Out::parse(text);
     for (std::size_t k = 0; k < json.at("rows").size(); ++k) {
@@ -244,6 +274,18 @@ int take_over(const std::string& text, const std::string& file, Study& study) {
     throw Error(ErrorKind::kInput, file, std::string("is no study that can be gone on with: ") + error.what(),
                 "--overwrite begins anew");
   }
+}
+
+std::vector<int> levels_left(const std::string& text, const std::string& file) {
+  const Json json = parse_study(text, file);
+  std::vector<int> left;
+  try {
+    const Json& reference = json.at("reference");
+    for (const Json& level : reference.at("levels")) left.push_back(level.at("substeps"));
+    left.push_back(reference.at("level_begun"));
+  } catch (const nlohmann::json::exception&) {  // of an earlier version, whose other directories stay
+  }
+  return left;
 }
 
 }  // namespace ringlet::study

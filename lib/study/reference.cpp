@@ -97,8 +97,7 @@ Ending Reference::refine(const Common& common) {
     fs::remove_all(directory_of(unused), error);
   }
   if (level.diverged && before == 0 && !can_refine())
-    throw Error(ErrorKind::kDiverged, "reference", outcome.message,
-                "softer springs or wider limits; there is nothing to measure against");
+    throw Error(ErrorKind::kDiverged, "reference: there is nothing to measure against", outcome.message);
   return Ending::kComplete;
 }
 

@@ -39,6 +39,7 @@ class Reference {
 
   bool started() const;     // there are as many levels as the ladder asks for, or no more are of use
   bool can_refine() const;  // the cap allows one more
+  int next() const;         // its substeps; 0: none within the cap
   Ending refine(const Common& common);  // one level more
 
   const std::vector<Level>& levels() const { return levels_; }
@@ -52,7 +53,6 @@ class Reference {
   const Plan& plan() const { return plan_; }
 
  private:
-  int next() const;  // 0: none within the cap
   void compare(Level& level, int before);
   std::filesystem::path directory_of(int substeps) const;
 

@@ -35,9 +35,15 @@ class Page {
 
   std::string write() {
     head();
-    cost();
-    waste();
-    knee();
+    if (reference_converges(study_)) {
+      cost();
+      waste();
+      knee();
+    } else {
+      say("**The reference does not converge**, so nothing is said of what accuracy costs, which settings "
+          "waste time and which is the knee: errors are distances from its last level, whose own error is "
+          "not known.\n");
+    }
     picked();
     runs();
     convergence();
@@ -85,7 +91,7 @@ class Page {
   void cost() {
     say("## What does the next digit cost?\n");
     if (!answers_.digit_cost) {
-      say("Not known: that takes two runs of which the slower is the more accurate.\n");
+      say("Not known: that takes two runs of which the slower is more accurate by a twentieth of a digit.\n");
       return;
     }
     say("Along the Pareto front **a tenth of the error takes {:.3g} times as long**. Step by step:\n",
@@ -95,9 +101,7 @@ class Page {
     for (std::size_t k = 0; k + 1 < answers_.front.size(); ++k) {
       const std::size_t a = answers_.front[k], b = answers_.front[k + 1];
       const Point from = point(a), to = point(b);
-      // Less than a twentieth of a digit says nothing about a whole one.
-      const bool gains = from.error / to.error > 1.12;
-      const auto digit = gains ? digit_cost(from, to) : std::nullopt;
+      const auto digit = digit_cost(from, to);
       say("| {} | {} | {:.3g} times | {:.3g} times | {} |", code(row(a).label), code(row(b).label),
           from.error / to.error, to.milliseconds / from.milliseconds,
           digit ? fmt::format("{:.3g} times the time", *digit) : std::string("hardly a gain"));
@@ -183,9 +187,9 @@ class Page {
                             row(order.rows[0]).columns[a]);
       say("- {}{}: {}.", code(study_.axes[order.axis].name), at, steps);
     }
-    say("\nThe error of the strands' step falls with order 1 in the substeps. Errors that something else "
-        "holds up, "
-        "and such as grow with a value, show as 0 or less.\n");
+    say("\nExpected of the step in the substeps: order 1, and less where lengths are held, solids touch or "
+        "hair meets hair. Errors that something else holds up, and such as grow with a value, show as 0 or "
+        "less.\n");
     say("## The reference\n");
     say("The scene as given{} in double precision, {} substeps a frame. Its substeps were doubled, at most "
         "to {}:\n",
@@ -203,6 +207,8 @@ class Page {
     if (study_.reference_converged)
       return "The last change is under a tenth of the smallest error of any run.";
     if (study_.levels.empty() || study_.reference_substeps == 0) return "It is not complete.";
+    if (!reference_converges(study_))
+      return "**The reference does not converge**: its last change is no smaller than the one before.";
     const auto& change = study_.levels.back().change;
     if (change && change->rms <= study_.resolution)
       return fmt::format(
@@ -309,6 +315,8 @@ std::string picked_text(const Study& study) {
   if (study.wanted.target)
     wanted += fmt::format("{}an error of {} {}", wanted.empty() ? "" : " and ", *study.wanted.target,
                           study.length_unit);
+  if (!reference_converges(study))
+    return fmt::format("which run stays within {} is not known: the reference does not converge\n", wanted);
   if (!answers.picked) return fmt::format("no run stays within {}\n", wanted);
   const Row& row = study.rows[*answers.picked];
   std::string out =

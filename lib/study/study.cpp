@@ -53,7 +53,7 @@ class Running {
       row.precision = machine_value("precision", variant.machine);
       most = std::max(most, most_substeps(variant.scene));
     }
-    take_over_rows();
+    look_at_what_is_there();
     Reference::Plan plan{options.base.file,
                          options.base.overrides,
                          options.base.machine,
@@ -71,7 +71,7 @@ class Running {
 
   Study run() {
     cache::make_directory(options_.directory);
-    if (options_.overwrite) fs::remove_all(options_.directory / "reference");
+    remove_replaced();
     study_.complete = steps();
     save();
     write_text(options_.directory / "plot.svg", plot(study_));
@@ -106,20 +106,26 @@ class Running {
                           .dump();
   }
 
-  void take_over_rows() {
+  void look_at_what_is_there() {
     const fs::path file = options_.directory / "study.json";
-    if (!options_.resume || !fs::exists(file)) return;
+    if (!(options_.resume || options_.overwrite) || !fs::exists(file)) return;
     std::ifstream stream(file, std::ios::binary);
     const std::string text{std::istreambuf_iterator<char>(stream), {}};
-    const int rows = take_over(text, file.string(), study_);
-    if (rows < 0) {
-      log_warning(
-          fmt::format("{}: is of another scene, version, range of frames or machine; nothing of it is used",
-                      file.string()));
-      fs::remove_all(options_.directory / "reference");
-    } else {
+    if (options_.resume) {
+      const int rows = take_over(text, file.string(), study_);
       log_info(fmt::format("{}: {} runs are taken over", file.string(), rows));
+    } else {
+      replaced_ = levels_left(text, file.string());
     }
+  }
+
+  // The reference's caches of the study that is replaced; what else lies beside them is not the study's.
+  void remove_replaced() const {
+    const fs::path directory = options_.directory / "reference";
+    std::error_code error;  // what cannot be removed is told where it is in the way
+    for (const int substeps : replaced_)
+      if (substeps > 0) fs::remove_all(directory / std::to_string(substeps), error);
+    fs::remove(directory, error);  // where it is empty
   }
 
   // False: stopped.
@@ -140,6 +146,8 @@ class Running {
   }
 
   bool refine() {
+    study_.level_begun = reference_->next();
+    save();
     const Ending ending = reference_->refine(options_.common);
     study_.levels = reference_->levels();
     if (ending == Ending::kStopped) return false;
@@ -216,6 +224,7 @@ class Running {
       study_.single.errors = measured.errors;
       study_.single.message = measured.outcome.message;
     } catch (const Error& error) {  // a scene that single precision is refused for
+      if (error.kind() != ErrorKind::kInput && error.kind() != ErrorKind::kUsage) throw;
       study_.single.message = error.what();
     }
     return true;
@@ -239,6 +248,7 @@ class Running {
   std::vector<Variant> variants_;
   Study study_;
   std::optional<Reference> reference_;
+  std::vector<int> replaced_;  // levels of the study that is overwritten
 };
 
 std::optional<double> numeric(const std::string& text) {
@@ -252,12 +262,21 @@ std::optional<double> numeric(const std::string& text) {
 
 Study run_study(const Options& options) { return Running(options).run(); }
 
+bool reference_converges(const Study& study) {
+  if (study.reference_converged) return true;
+  const Level* last = nullptr;  // that is complete
+  for (const Level& level : study.levels)
+    if (!level.diverged) last = &level;
+  return !last || !last->order || *last->order > 0 || last->change->rms <= study.resolution;
+}
+
 Answers answer(const Study& study) {
   const std::vector<Point> points = points_of(study);
   Answers answers;
+  answers.beaten.resize(points.size());
+  if (!reference_converges(study)) return answers;
   answers.front = pareto_front(points);
-  for (std::size_t k = 0; k < points.size(); ++k)
-    answers.beaten.push_back(dominating(points, answers.front, k));
+  for (std::size_t k = 0; k < points.size(); ++k) answers.beaten[k] = dominating(points, answers.front, k);
   for (std::size_t k = 0; k < points.size(); ++k)
     if (!std::isfinite(points[k].milliseconds) || !std::isfinite(points[k].error)) answers.beaten[k].reset();
   answers.knee = knee(points, answers.front);

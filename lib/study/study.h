@@ -73,6 +73,7 @@ struct Study {
   std::vector<Row> rows;
   std::vector<std::string> reference_overrides;
   std::vector<Level> levels;
+  int level_begun = 0;  // substeps of the level that was begun last; 0: none
   int reference_substeps = 0, reference_cap = 0;
   bool reference_converged = false;  // the last change is under a tenth of the smallest error
   double resolution = 0;
@@ -81,11 +82,17 @@ struct Study {
 };
 
 // Runs what is missing and writes study.json, study.csv, plot.svg and report.md into the directory, the first
-// two after every run. Returns early, with `complete` false, where options.common.stop says so. Throws
-// Error{kInput, kUsage} before anything runs for settings that cannot be; Error{kDiverged} where no reference
-// can be made; Error{kIo}.
+// two after every run. With `resume` it goes on with the study of the same identity there; with `overwrite`
+// it removes what its study.json tells of. Returns early, with `complete` false, where options.common.stop
+// says so. Throws Error{kInput, kUsage} before anything runs or is removed, for settings that cannot be and
+// for `resume` of another study; Error{kDiverged} where no reference can be made; Error{kIo}.
 Study run_study(const Options& options);
 
+// False where the reference's last change is no smaller than the one before, though larger than what single
+// precision shows: then nothing is known of how far it is from what it stands for.
+bool reference_converges(const Study& study);
+
+// Without any answer where the reference does not converge.
 Answers answer(const Study& study);
 std::vector<Order> orders_of(const Study& study);
 

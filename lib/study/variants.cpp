@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "core/json_text.h"
+#include "scene/overrides.h"
 
 namespace ringlet::study {
 namespace {
@@ -50,7 +51,8 @@ std::vector<std::string> foreign_parts(const Json& document, const std::string& 
   }
   for (const char* pointer : {"/effects/inextensible", "/effects/hair_hair", "/effects/wind/shelter"})
     if (document.contains(Json::json_pointer(pointer))) parts.emplace_back(pointer);
-  const Json& groom = document.at("groom");
+  if (!document.contains("groom")) return parts;
+  const Json& groom = document["groom"];
   for (std::size_t g = 0; g < (groom.is_array() ? groom.size() : 1); ++g)
     for (const char* key : {"interpolate", "stiffness", "particles"})
       leave((groom.is_array() ? fmt::format("/groom/{}/", g) : std::string("/groom/")) + key);
@@ -71,6 +73,7 @@ class Maker {
     Variant variant;
     variant.overrides = base_.overrides;
     variant.machine = base_.machine;
+    variant.left_out = left_out(choice);
     int changed = 0;
     for (std::size_t a = 0; a < axes_.size(); ++a) {
       if (choice[a] < 0) {
@@ -79,11 +82,16 @@ class Maker {
         continue;
       }
       const Value& value = axes_[a].values[static_cast<std::size_t>(choice[a])];
+      if (is_within(axes_[a].name, variant.left_out)) {
+        variant.columns.emplace_back("null");
+        continue;
+      }
       variant.columns.push_back(value.text);
       variant.label += (variant.label.empty() ? "" : ", ") + names_[a] + "=" + value.text;
       variant.axis = ++changed == 1 ? static_cast<int>(a) : -1;
       change(axes_[a], value, variant);
     }
+    for (const std::string& part : variant.left_out) set(part + "=null", variant);
     if (changed == 0) variant.label = kAsGiven;
     scene::LoadOptions options{variant.overrides, "--vary"};
     variant.scene = changed == 0 ? scene_ : scene::load(base_.file, options);
@@ -92,22 +100,37 @@ class Maker {
   }
 
  private:
-  void change(const Axis& axis, const Value& value, Variant& variant) const {
+  // What the model that is chosen does not take of the scene with the chosen values; nothing where none is.
+  std::vector<std::string> left_out(const std::vector<int>& choice) const {
+    Json document = document_;
+    std::string model;
+    for (std::size_t a = 0; a < axes_.size(); ++a) {
+      if (choice[a] < 0 || !axes_[a].of_scene()) continue;
+      const Value& value = axes_[a].values[static_cast<std::size_t>(choice[a])];
+      scene::apply_override(axes_[a].name + "=" + value.json, document, "--vary");
+      if (axes_[a].name == kModel) model = value.text;
+    }
+    return model.empty() ? std::vector<std::string>() : foreign_parts(document, model);
+  }
+
+  static bool is_within(const std::string& pointer, const std::vector<std::string>& parts) {
+    return std::any_of(parts.begin(), parts.end(), [&](const std::string& part) {
+      return pointer == part || pointer.starts_with(part + "/");
+    });
+  }
+
+  static void set(const std::string& text, Variant& variant) {
+    variant.overrides.push_back(text), variant.changes.push_back(text);
+    variant.options.push_back("--set " + quoted(text));
+  }
+
+  static void change(const Axis& axis, const Value& value, Variant& variant) {
     if (!axis.of_scene()) {
       set_machine(axis.name, value.text, variant.machine);
       variant.options.push_back("--" + axis.name + " " + value.text);
       return;
     }
-    const auto set = [&](const std::string& text) {
-      variant.overrides.push_back(text), variant.changes.push_back(text);
-      variant.options.push_back("--set " + quoted(text));
-    };
-    set(axis.name + "=" + value.json);
-    if (axis.name != kModel || value.text == document_["model"]["type"]) return;
-    for (const std::string& part : foreign_parts(document_, value.text)) {
-      set(part + "=null");
-      variant.left_out.push_back(part);
-    }
+    set(axis.name + "=" + value.json, variant);
   }
 
   static std::string key_of(const Variant& variant) {

@@ -34,7 +34,8 @@ struct Base {
 };
 
 // The runs, each once: the scene as given and each axis' values around it, or with `product` every
-// combination of values. A model that does not take a part of the scene as given runs without that part.
+// combination of values. Where the model is varied, a run whose model does not take a part that the scene as
+// given has, or that another axis gives it, is without that part; an axis within it has no value there.
 // Every run's scene is loaded and so checked. Throws Error{kUsage, kInput}.
 std::vector<Variant> make_variants(const Base& base, const std::vector<Axis>& axes, bool product);
 

@@ -53,6 +53,10 @@ def study(program, scene, out, *options, code=0):
     return told, rows
 
 
+def files(directory):
+    return {path.relative_to(directory): path.read_bytes() for path in directory.rglob("*") if path.is_file()}
+
+
 # ---- what comes out
 
 
@@ -63,7 +67,9 @@ def substeps(program, scene, tmp_path_factory):
 
 
 def test_one_setting_at_a_time_is_a_row_each_and_a_run_twice_named_is_one(substeps):
-    _, told, rows = substeps
+    out, told, rows = substeps
+    columns = (out / "study.csv").read_text().splitlines()[0].split(",")
+    assert len(columns) == len(set(columns)) and columns.count("precision") == columns.count("backend") == 1
     assert [row["label"] for row in told["rows"]] == ["as given", "substeps=4", "substeps=16", "precision=double"]
     assert [(row["/model/substeps"], row["precision"]) for row in rows] == [
         ("8", "float"), ("4", "float"), ("16", "float"), ("8", "double"),
@@ -224,7 +230,14 @@ def test_a_run_that_diverges_is_a_row(program, scene, tmp_path):
 
 def test_without_a_reference_there_is_no_study(program, scene, tmp_path):
     result = run(program, "study", scene, "-o", tmp_path / "study", *QUICK, "--set", "/limits/speed=1e-3", "--vary", "threads=1")
-    assert result.returncode == 4 and "reference" in result.stderr
+    assert result.returncode == 4 and "reference: there is nothing to measure against: frame 2" in result.stderr
+    assert result.stderr.count("wider limits") == 1
+
+
+def test_that_a_run_leaves_more_than_its_tolerance_is_told_once(program, scene, tmp_path):
+    result = run(program, "study", scene, "-o", tmp_path / "study", "--frames", "1-2", "--repeats", "3", "--reference-cap", "4",
+                 "--set", '/model/substeps={"tolerance":1e-9,"max":2}', "--vary", "threads=1")  # fmt: skip
+    assert result.returncode == 0 and result.stderr.count("above the tolerance") == 1, result.stderr
 
 
 # ---- going on
@@ -251,10 +264,11 @@ def test_a_study_that_is_cut_goes_on_with_the_rows_it_has(program, scene, tmp_pa
     assert told["reference"]["levels"] == cut["reference"]["levels"]
     assert (out / "study.csv").read_text().splitlines()[: len(cut["rows"]) + 1] == lines
 
-    # Of another scene nothing is taken over.
-    told, _ = study(program, scene, out, "--resume", *options[:4], "--vary", "/model/substeps=2", "--set", "/effects/gravity=[0,-5,0]")
-    assert len(told["rows"]) == 2 and told["scene_hash"] != cut["scene_hash"]
-    assert {row["ms_per_frame"] for row in told["rows"]}.isdisjoint({row["ms_per_frame"] for row in cut["rows"]})
+    # A study of another scene is not gone on with, and nothing of this one is lost.
+    kept = files(out)
+    result = run(program, "study", scene, "-o", out, "--resume", *options, "--set", "/effects/gravity=[0,-5,0]")
+    assert result.returncode == 2 and "cannot be gone on with: scene_hash is" in result.stderr
+    assert files(out) == kept
 
 
 def test_a_study_is_not_written_over_unasked(program, scene, tmp_path):
@@ -262,7 +276,21 @@ def test_a_study_is_not_written_over_unasked(program, scene, tmp_path):
     study(program, scene, tmp_path / "study", *options)
     result = run(program, "study", scene, "-o", tmp_path / "study", *options)
     assert result.returncode == 2 and "--resume goes on with it" in result.stderr
-    study(program, scene, tmp_path / "study", "--overwrite", *options)
+
+    # What is replaced is the study's own, and only once its settings are seen to be possible.
+    note = tmp_path / "study/reference/note.txt"
+    note.write_text("mine")
+    kept = files(tmp_path / "study")
+    refused = run(program, "study", scene, "-o", tmp_path / "study", "--overwrite", *options, "--vary", "/groom/particles=1")
+    assert refused.returncode == 3 and files(tmp_path / "study") == kept
+    told, _ = study(program, scene, tmp_path / "study", "--overwrite", *options[:4], "--reference-cap", "4", "--vary", "/model/substeps=1")
+    assert note.read_text() == "mine"
+    assert {path.name for path in note.parent.iterdir()} == {"note.txt", str(told["reference"]["substeps"])}
+
+    (tmp_path / "study/study.json").write_text('{"mine": 1}')
+    result = run(program, "study", scene, "-o", tmp_path / "study", "--overwrite", *options)
+    assert result.returncode == 3 and "is no study" in result.stderr
+    assert (tmp_path / "study/study.json").read_text() == '{"mine": 1}'
 
 
 # ---- bad input, told before anything runs
@@ -276,6 +304,7 @@ BAD = [
     ("precision=half", 2, "found `half`, expected float or double"),
     ("speed=1", 2, "neither a JSON pointer nor a setting"),
     ("/model/substeps", 2, "expected POINTER=V1,V2"),
+    ("/frames/fps=24,48", 2, "would be of different times"),
 ]
 
 

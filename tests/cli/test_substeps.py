@@ -5,7 +5,7 @@ import h5py
 import numpy as np
 import pytest
 
-from conftest import run
+from conftest import SOURCE, run
 from tiny import LENGTH, data_bytes, figures, steps, strands, write_scene
 from tiny_mesh import write_mesh_scene
 
@@ -80,6 +80,22 @@ def test_the_estimate_is_the_error_of_a_frame(program, tmp_path):
     assert figures(tmp_path / "out", "step_error")[1] == pytest.approx(error, rel=0.1)
     again = steps(program, scene, tmp_path / "again", *options, fixed(int(figures(tmp_path / "out", "substeps")[1])))
     assert (positions(tmp_path / "again") == positions(tmp_path / "out")).all() and again
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 3e-4])
+def test_with_lengths_held_and_solids_no_more_than_the_tolerance_is_left(program, tmp_path, tolerance):
+    """Errors fall with an order below 1 there, which the estimate must not take for granted."""
+    options = ['--set=/name="tiny"', "--set=/frames/last=2", "--set=/groom/grow/strands=200", "--precision=double"]
+
+    def at(name, *more):
+        steps(program, SOURCE / "scenes/quickstart.json", tmp_path / name, *options, *more)
+        return positions(tmp_path / name)
+
+    finest = at("finest", fixed(1000))
+    length = np.linalg.norm(np.diff(finest[0].reshape(200, -1, 3), axis=1), axis=-1).sum(1).mean()
+    error = np.sqrt(((at("out", chosen(tolerance))[1] - finest[1]) ** 2).sum(-1).mean()) / length
+    assert error <= tolerance and figures(tmp_path / "out", "step_error")[1] <= tolerance
+    assert figures(tmp_path / "out", "substeps")[1] <= 256  # and not by waste
 
 
 def test_a_hard_frame_gets_more_substeps_than_a_still_one(program, tmp_path):

@@ -127,3 +127,26 @@ def test_a_trace_that_cannot_be_written_is_told_before_anything_runs(program, sc
     result = run(program, "run", scene, "-o", tmp_path / "out", "--trace", tmp_path / "no/t.json")
     assert result.returncode == 5 and "t.json: cannot be written" in result.stderr
     assert not (tmp_path / "out").exists()
+
+
+def test_a_trace_replaces_nothing_but_a_trace(program, scene, tmp_path):
+    """The scene, any other file; and of earlier traces only those of runs that come to step."""
+    victim = tmp_path / "victim.json"
+    victim.write_bytes(scene.read_bytes())
+    for file in (scene, victim, scene.parent / "head.obj"):
+        before = file.read_bytes()
+        result = run(program, "run", scene, "-o", tmp_path / "out", "--trace", file)
+        assert result.returncode == 2 and "is no trace" in result.stderr
+        assert file.read_bytes() == before and not (tmp_path / "out").exists()
+
+    traced(program, scene, tmp_path)
+    earlier = (tmp_path / "trace.json").read_bytes()
+    refused = [(["--set=/model/substeps=0"], 3), ([], 2), (["--resume", "--set=/model/substeps=3"], 2)]
+    for options, code in refused:
+        result = run(program, "run", scene, "-o", tmp_path / "out", "--trace", tmp_path / "trace.json", *options)
+        assert result.returncode == code, result.stderr
+        assert (tmp_path / "trace.json").read_bytes() == earlier
+    result = run(program, "run", scene, "-o", tmp_path / "other", "--trace", tmp_path / "new.json", "--set=/model/substeps=0")
+    assert result.returncode == 3 and not (tmp_path / "new.json").exists()
+    traced(program, scene, tmp_path)
+    assert (tmp_path / "trace.json").read_bytes() != earlier

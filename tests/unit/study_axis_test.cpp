@@ -129,6 +129,22 @@ TEST_F(StudyVariants, OfAnotherModelLackWhatItDoesNotTake) {
   EXPECT_THAT(from_strands[1].options, testing::Contains("--set /effects/inextensible=null"));
 }
 
+TEST_F(StudyVariants, OfAProductWithModelsLackWhatAnotherAxisPutsBack) {
+  scene::Json json = full_hair_mesh();
+  json["model"] = {{"type", "ams"}};
+  json["effects"] = {{"hair_hair", {{"grid", scene::Json::object()}}}};
+  const std::string grid = "/effects/hair_hair/grid/resolution=16,32";
+  const auto variants = make(json, {"/model/type=ams,hair_mesh", grid, "/model/substeps=2,4"}, true);
+  EXPECT_THAT(labels(variants),
+              ElementsAre("type=ams, resolution=16, substeps=2", "type=ams, resolution=16, substeps=4",
+                          "type=ams, resolution=32, substeps=2", "type=ams, resolution=32, substeps=4",
+                          "type=hair_mesh, substeps=2", "type=hair_mesh, substeps=4"));
+  EXPECT_THAT(variants[4].columns, ElementsAre("hair_mesh", "null", "2"));
+  EXPECT_THAT(variants[4].left_out, ElementsAre("/effects/hair_hair"));
+  EXPECT_FALSE(variants[4].scene.effects.hair_hair);
+  EXPECT_THAT(variants[0].left_out, testing::IsEmpty());
+}
+
 TEST_F(StudyVariants, TellEveryBadValueAtOnce) {
   try {
     make(minimal(), {"/model/substeps=0,4,2000", "/model/substep=3"});

@@ -8,6 +8,8 @@
 #include "study/errors.h"
 #include "study/front.h"
 #include "study/reference.h"
+#include "study/report.h"
+#include "study/study.h"
 
 namespace ringlet::study {
 namespace {
@@ -63,6 +65,7 @@ TEST(StudyFront, ADigitOfAFirstOrderMethodCostsTenTimes) {
   EXPECT_NEAR(digit_cost(points, {0, 1, 2, 3}).value(), 10, 1e-9);
   EXPECT_NEAR(digit_cost({1, 1}, {2, 0.01}).value(), std::sqrt(2), 1e-12);
   EXPECT_FALSE(digit_cost(points, {0}));
+  EXPECT_FALSE(digit_cost({1, 1}, {2, 0.99})) << "a hundredth of the error is no digit";
   EXPECT_FALSE(digit_cost({1, 0}, {2, 0}));
 }
 
@@ -122,6 +125,51 @@ TEST(StudyReference, DoublesToSixteenTimesTheFinestRun) {
   EXPECT_THAT(ladder(1, 1000), ElementsAre(2, 4, 8, 16));
   EXPECT_THAT(ladder(8, 4), ElementsAre(1, 2, 4));
   EXPECT_THAT(ladder(1, 1), ElementsAre(1));
+}
+
+// A study of two runs against a reference whose changes are these.
+Study study_of(const std::vector<double>& changes) {
+  Study study;
+  study.length_unit = "m";
+  study.complete = true;
+  study.reference_substeps = 1 << changes.size();
+  study.wanted.target = 1;
+  for (std::size_t k = 0; k < changes.size(); ++k) {
+    Level level{2 << k, false, Spread{changes[k], changes[k]}, {}};
+    if (k > 0) level.order = std::log2(changes[k - 1] / changes[k]);
+    study.levels.push_back(level);
+  }
+  for (const auto& [time, error] : {std::pair(1.0, 0.1), std::pair(2.0, 0.01)}) {
+    Row& row = study.rows.emplace_back();
+    row.status = Status::kOk;
+    row.label = row.key = std::to_string(time);
+    row.measured.errors.position = Spread{error, error};
+    row.timed.emplace().milliseconds = time;
+  }
+  return study;
+}
+
+TEST(StudyAnswers, AreNoneWhereTheReferenceDoesNotConverge) {
+  const Study growing = study_of({0.02, 0.01, 0.015});
+  EXPECT_FALSE(reference_converges(growing));
+  const Answers none = answer(growing);
+  EXPECT_FALSE(none.digit_cost || none.knee || none.picked);
+  EXPECT_THAT(none.front, ElementsAre());
+  EXPECT_EQ(none.beaten.size(), 2u);
+  const std::string page = report(growing);
+  EXPECT_THAT(page, testing::HasSubstr("**The reference does not converge**"));
+  EXPECT_THAT(page, testing::Not(testing::HasSubstr("times as long")));
+  EXPECT_THAT(page, testing::Not(testing::HasSubstr("was reached")));
+
+  const Study falling = study_of({0.02, 0.01, 0.007});
+  EXPECT_TRUE(reference_converges(falling));
+  EXPECT_EQ(answer(falling).picked, 0u);
+  EXPECT_THAT(report(falling), testing::HasSubstr("a tenth of the error takes 2 times as long"));
+  EXPECT_THAT(report(falling), testing::HasSubstr("was reached"));
+
+  Study noise = study_of({2e-8, 1e-8, 1.5e-8});
+  noise.resolution = 2e-8;
+  EXPECT_TRUE(reference_converges(noise)) << "single precision shows no smaller change";
 }
 
 }  // namespace

@@ -229,9 +229,11 @@ def test_a_run_that_diverges_is_a_row(program, scene, tmp_path):
 
 
 def test_without_a_reference_there_is_no_study(program, scene, tmp_path):
-    result = run(program, "study", scene, "-o", tmp_path / "study", *QUICK, "--set", "/limits/speed=1e-3", "--vary", "threads=1")
-    assert result.returncode == 4 and "reference: there is nothing to measure against: frame 2" in result.stderr
-    assert result.stderr.count("wider limits") == 1
+    options = (*QUICK, "--set", "/limits/speed=1e-3", "--vary", "threads=1")
+    for cap, message in (("1000", "reference: it diverges whatever its substeps"), ("4", "reference: there is nothing to measure against: frame 2")):
+        result = run(program, "study", scene, "-o", tmp_path / cap, *options, "--reference-cap", cap)
+        assert result.returncode == 4 and message in result.stderr
+        assert result.stderr.count("wider limits") == 1
 
 
 def test_that_a_run_leaves_more_than_its_tolerance_is_told_once(program, scene, tmp_path):

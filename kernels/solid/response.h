@@ -104,9 +104,12 @@ struct ContactLane {
     return contact;
   }
   // Begins a walk along the strand. Roots lie on the home solid, and deeper in it only as a groom is kept
-  // there. With a solid that its root is in deeper than it is long a strand does not collide at all.
+  // there. With a solid that its root is in deeper than it is long a strand does not collide at all. Hair
+  // whose lengths are free comes out of anything.
   RINGLET_FUNCTION void begin(StrandContact<T>& contact) const {
-    if (&contact.solid != step.solids + step.home || step.home < 0) contact.begin_at_root();
+    const bool lengths_held = step.length_iterations > 0 || step.skipped_substeps > 0;
+    const bool home = step.home >= 0 && &contact.solid == step.solids + step.home;
+    if (lengths_held && !home) contact.begin_at_root();
     T longest = T(0);
     for (int i = 1; i < count && contact.slack > T(0); ++i) longest = longest + segment_before(i);
     if (contact.slack > longest) contact.slack = far_inside<T>();

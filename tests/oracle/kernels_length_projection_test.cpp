@@ -1,6 +1,8 @@
 // The length projection against the reference's: what it leaves, what it keeps, where it gives up.
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
+
 #include "kernels_support.h"
 #include "oracle/random_strand.h"
 
@@ -235,6 +237,28 @@ TYPED_TEST(KernelLengths, TakeMoreSubstepsWhereTheCapIsHit) {
   EXPECT_GT(capped.most_pieces, 1);
   EXPECT_LE(capped.most_pieces, 16);
   EXPECT_TRUE(capped.strain <= 1e-3) << capped.strain;
+}
+
+// Displaced by many segments, with a single Newton iteration: no number of pieces brings that back. Meanwhile
+// the root turns, piece by piece.
+TYPED_TEST(KernelLengths, AreLaidOutWhereNoPiecesBringThemBack) {
+  std::mt19937 generator(9);
+  for (const int count : {17, 64})
+    for (const int clamped : {1, 2}) {
+      const auto [strand, x] = displaced<typename TypeParam::T>(generator, count, clamped, 1.0);
+      StrandRun<TypeParam> run({strand}, {RootPose{}}, false);
+      make_forceless(run);
+      run.parameters.length_iterations = 1, run.parameters.length_tolerance = typename TypeParam::T(1e-5);
+      run.set(0, {x, Points::Zero(3, x.cols())});
+      const RootPose turned{oracle::Mat3(Eigen::AngleAxisd(0.7, oracle::Vec3(1, 2, 3).normalized()))};
+      run.step({turned}, 1.0 / 24);
+      const Points end = run.get(0).position;
+      const double strain = oracle::worst_edge_strain(strand, end);
+      EXPECT_TRUE(strain <= 2e-5) << count << " particles: strain " << strain;
+      EXPECT_EQ(run.figure(0, kernels::kSubdivisions), 16);
+      const double off = (end - turned.rotation * strand.rest).leftCols(clamped).norm();
+      EXPECT_TRUE(off <= this->either(1e-14, 1e-7)) << "clamped particles are " << off << " m off";
+    }
 }
 
 }  // namespace

@@ -86,5 +86,19 @@ TYPED_TEST(KernelStep, SolvesTheReferencesSystemWithoutGhosts) {
   }
 }
 
+// The angular tangent goes with 1 / |x_i - x_{i-1}| down to a tenth of the rest length.
+TYPED_TEST(KernelStep, SolvesTheReferencesSystemOfSegmentsUnderATenthOfTheirLength) {
+  std::mt19937 generator(4);
+  for (int count : {2, 5, 17}) {
+    RandomStrand random = oracle::random_strand(generator, count, 1);
+    oracle::Points& x = random.state.position;
+    for (int i = 1; i < count; i += 2) {
+      const double rest = (random.strand.rest.col(i) - random.strand.rest.col(i - 1)).norm();
+      x.col(i) = x.col(i - 1) + 0.03 * rest * (x.col(i) - x.col(i - 1)).normalized();
+    }
+    this->compare(random, true, std::to_string(count) + " particles, short segments");
+  }
+}
+
 }  // namespace
 }  // namespace ringlet::kernels_testing

@@ -6,7 +6,6 @@
 #include <tbb/info.h>
 #include <tbb/parallel_for.h>
 
-#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -15,6 +14,7 @@
 #include "core/timer.h"
 #include "effects/executor.h"
 #include "kernels/launch/launch.h"
+#include "pipeline/frame_times.h"
 #include "scene/scene.h"
 
 namespace ringlet::app {
@@ -22,10 +22,7 @@ namespace {
 
 using Row = nlohmann::ordered_json;
 
-double median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
-  return values[values.size() / 2];
-}
+using pipeline::median;
 
 // ---- The strand step alone
 // ----------------------------------------------------------------------------------------
@@ -139,35 +136,26 @@ Row strand_row(const std::string& instruction_set, int threads, int repeats) {
 // ---- Whole scenes
 // -------------------------------------------------------------------------------------------------
 
-class Discard : public state::FrameSink {
-  void write(state::Frame, state::Snapshot, double) override {}
-  void finish() override {}
-};
-
 Row scene_row(const std::string& file, const BenchOptions& options) {
   const Timer load_timer;
   const scene::Scene scene = scene::load(file);
   const auto simulation = pipeline::Simulation::create(scene, options.options);
   const double load_seconds = load_timer.seconds();
-  std::vector<double> frames;
-  std::vector<std::pair<std::string, std::vector<double>>> stages;
+  pipeline::FrameTimes times;
   pipeline::RunControl control;
-  control.on_frame = [&](int, double seconds, const pipeline::StageSeconds& parts) {
-    frames.push_back(seconds);
-    if (stages.empty())
-      for (const auto& [name, spent] : parts) stages.push_back({name, {}});
-    for (std::size_t k = 0; k < parts.size(); ++k) stages[k].second.push_back(parts[k].second);
+  control.on_frame = [&](int, double seconds, const pipeline::StageSeconds& stages) {
+    times.add(seconds, stages);
   };
-  Discard sink;
+  pipeline::DiscardFrames sink;
   simulation->run({scene.frames.first, scene.frames.last}, sink, control);
   const pipeline::Plan& plan = simulation->plan();
   Row row = {{"row", scene.name},
              {"strands", plan.strands},
              {"particles", plan.particles},
              {"substeps", plan.substeps},
-             {"ms_per_frame", 1e3 * median(frames)},
+             {"ms_per_frame", times.milliseconds()},
              {"load_seconds", load_seconds}};
-  for (const auto& [name, seconds] : stages) row["stages_ms"][name] = 1e3 * median(seconds);
+  for (const auto& [name, milliseconds] : times.stage_milliseconds()) row["stages_ms"][name] = milliseconds;
   return row;
 }
 

@@ -27,25 +27,23 @@ void add_scene(CLI::App& command, std::string& file, std::vector<std::string>& o
 namespace {
 
 template <class Enum>
-CLI::CheckedTransformer words(std::map<std::string, Enum> values) {
-  return CLI::CheckedTransformer(std::move(values), CLI::ignore_case);
+CLI::CheckedTransformer words(const std::map<std::string, Enum>& values) {
+  return CLI::CheckedTransformer(values, CLI::ignore_case);
 }
 
 void add_machine(CLI::App& command, pipeline::Options& options, int& threads) {
-  using pipeline::Backend, pipeline::Precision;
   command.add_option("--backend", options.backend, "auto, cpu or cuda")
-      ->transform(
-          words<Backend>({{"auto", Backend::kAuto}, {"cpu", Backend::kCpu}, {"cuda", Backend::kCuda}}))
+      ->transform(words(pipeline::backend_words()))
       ->option_text("auto/cpu/cuda");
   command.add_option("--precision", options.precision, "float or double")
-      ->transform(words<Precision>({{"float", Precision::kFloat}, {"double", Precision::kDouble}}))
+      ->transform(words(pipeline::precision_words()))
       ->option_text("float/double");
   command
       .add_option("--instruction-set", options.instruction_set, "of the CPU; the widest there is by default")
-      ->check(CLI::IsMember({"generic", "avx2", "avx512"}))
+      ->check(CLI::IsMember(pipeline::instruction_set_words()))
       ->option_text("generic/avx2/avx512");
   command.add_option("--threads", threads, "CPU threads; all by default")
-      ->check(CLI::Range(1, 4096))
+      ->check(CLI::Range(1, pipeline::kMostThreads))
       ->option_text("N");
 }
 

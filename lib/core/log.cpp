@@ -3,6 +3,9 @@
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
+#include <mutex>
+#include <set>
+
 namespace ringlet {
 namespace {
 spdlog::logger& logger() {
@@ -30,5 +33,11 @@ void set_log_level(LogLevel level) {
 void log_debug(const std::string& message) { logger().debug("{}", message); }
 void log_info(const std::string& message) { logger().info("{}", message); }
 void log_warning(const std::string& message) { logger().warn("{}", message); }
+void log_warning_once(const std::string& message) {
+  static std::mutex mutex;
+  static std::set<std::string> given;
+  const std::lock_guard lock(mutex);
+  if (given.insert(message).second) log_warning(message);
+}
 
 }  // namespace ringlet

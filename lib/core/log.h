@@ -10,5 +10,7 @@ void set_log_level(LogLevel level);
 void log_debug(const std::string& message);
 void log_info(const std::string& message);
 void log_warning(const std::string& message);
+// The same words only once in a process: a study takes the same run several times.
+void log_warning_once(const std::string& message);
 
 }  // namespace ringlet

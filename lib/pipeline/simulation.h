@@ -6,20 +6,12 @@
 #include <optional>
 
 #include "core/error.h"
+#include "pipeline/options.h"
 #include "pipeline/plan.h"
 #include "scene/scene_desc.h"
 #include "state/frame.h"
 
 namespace ringlet::pipeline {
-
-enum class Backend { kAuto, kCpu, kCuda };
-enum class Precision { kFloat, kDouble };
-
-struct Options {
-  Backend backend = Backend::kAuto;
-  Precision precision = Precision::kFloat;
-  std::string instruction_set;  // of the CPU: avx512, avx2, generic; empty: the widest there is
-};
 
 struct FrameRange {
   int first, last;  // written; stepping always starts at the scene's first frame

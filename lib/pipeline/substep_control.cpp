@@ -6,8 +6,6 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <mutex>
-#include <set>
 
 #include "core/error.h"
 #include "core/log.h"
@@ -28,14 +26,6 @@ double change(const std::vector<double>& from, const std::vector<double>& to, do
   double square = 0;
   for (std::size_t k = 0; k < to.size(); ++k) square += (to[k] - from[k]) * (to[k] - from[k]);
   return std::sqrt(square / particles);
-}
-
-// A study takes the same run several times: a warning of the same words is given once.
-void warn_once(const std::string& message) {
-  static std::mutex mutex;
-  static std::set<std::string> given;
-  const std::lock_guard lock(mutex);
-  if (given.insert(message).second) log_warning(message);
 }
 
 }  // namespace
@@ -81,7 +71,7 @@ void SubstepControl::step(int frame, double particles, const Try& take) {
   if (error_ <= choice_.tolerance || told_) return;
   told_ = true;
   const std::string error = std::isfinite(error_) ? fmt::format("of {:.2g}", error_) : "that is not known";
-  warn_once(fmt::format(
+  log_warning_once(fmt::format(
       "frame {}: {} substeps, the most there may be, leave an error {} of the strands' length, above the "
       "tolerance of {:.2g} (a larger /model/substeps/max would do); later frames' are in the cache's figures",
       frame, substeps_, error, choice_.tolerance));

@@ -13,14 +13,6 @@
 namespace ringlet::study {
 namespace {
 
-using pipeline::Backend, pipeline::Precision;
-
-const std::map<std::string, Precision> kPrecisions = {{"float", Precision::kFloat},
-                                                      {"double", Precision::kDouble}};
-const std::map<std::string, Backend> kBackends = {
-    {"auto", Backend::kAuto}, {"cpu", Backend::kCpu}, {"cuda", Backend::kCuda}};
-const std::vector<std::string> kInstructionSets = {"generic", "avx2", "avx512"};
-
 [[noreturn]] void refuse(const std::string& text, const std::string& what, const std::string& hint = {}) {
   throw Error(ErrorKind::kUsage, "--vary " + text, what, hint);
 }
@@ -51,7 +43,8 @@ std::vector<std::string> split(const std::string& text) {
 bool is_thread_count(const std::string& text) {
   int threads = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), threads);
-  return error == std::errc() && end == text.data() + text.size() && threads >= 1 && threads <= 4096;
+  return error == std::errc() && end == text.data() + text.size() && threads >= 1 &&
+         threads <= pipeline::kMostThreads;
 }
 
 template <class T>
@@ -66,13 +59,13 @@ struct Taken {
   std::string expected;
 };
 Taken taken(const std::string& setting, const std::string& value) {
-  if (setting == "precision") return {true, kPrecisions.contains(value), "float or double"};
-  if (setting == "backend") return {true, kBackends.contains(value), "auto, cpu or cuda"};
-  if (setting == "threads") return {true, is_thread_count(value), "a number from 1 to 4096"};
+  const auto& sets = pipeline::instruction_set_words();
+  if (setting == "precision") return {true, pipeline::precision_words().contains(value), "float or double"};
+  if (setting == "backend") return {true, pipeline::backend_words().contains(value), "auto, cpu or cuda"};
+  if (setting == "threads")
+    return {true, is_thread_count(value), fmt::format("a number from 1 to {}", pipeline::kMostThreads)};
   if (setting == "instruction-set")
-    return {true,
-            std::find(kInstructionSets.begin(), kInstructionSets.end(), value) != kInstructionSets.end(),
-            "generic, avx2 or avx512"};
+    return {true, std::find(sets.begin(), sets.end(), value) != sets.end(), "generic, avx2 or avx512"};
   return {false, false, ""};
 }
 
@@ -118,15 +111,15 @@ Axis parse_axis(const std::string& text) {
 }
 
 void set_machine(const std::string& setting, const std::string& value, Machine& machine) {
-  if (setting == "precision") machine.options.precision = kPrecisions.at(value);
-  if (setting == "backend") machine.options.backend = kBackends.at(value);
+  if (setting == "precision") machine.options.precision = pipeline::precision_words().at(value);
+  if (setting == "backend") machine.options.backend = pipeline::backend_words().at(value);
   if (setting == "threads") machine.threads = std::stoi(value);
   if (setting == "instruction-set") machine.options.instruction_set = value;
 }
 
 std::string machine_value(const std::string& setting, const Machine& machine) {
-  if (setting == "precision") return name_of(kPrecisions, machine.options.precision);
-  if (setting == "backend") return name_of(kBackends, machine.options.backend);
+  if (setting == "precision") return name_of(pipeline::precision_words(), machine.options.precision);
+  if (setting == "backend") return name_of(pipeline::backend_words(), machine.options.backend);
   if (setting == "threads") return machine.threads > 0 ? std::to_string(machine.threads) : "all";
   return machine.options.instruction_set.empty() ? "widest" : machine.options.instruction_set;
 }

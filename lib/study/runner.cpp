@@ -2,9 +2,8 @@
 
 #include <tbb/global_control.h>
 
-#include <algorithm>
-
 #include "cache/writer.h"
+#include "pipeline/frame_times.h"
 
 namespace ringlet::study {
 namespace {
@@ -19,17 +18,6 @@ class Threads {
  private:
   std::optional<tbb::global_control> control_;
 };
-
-class Discard : public state::FrameSink {
-  void write(state::Frame, state::Snapshot, double) override {}
-  void finish() override {}
-};
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 Outcome run(pipeline::Simulation& simulation, const Common& common, state::FrameSink& sink,
             pipeline::RunControl control) {
@@ -75,27 +63,20 @@ Measured measure_run(const Variant& variant, const std::filesystem::path& file, 
 
 Timed time_run(const Variant& variant, const Common& common) {
   const Threads threads(variant.machine.threads);
-  std::vector<double> frames;
-  std::vector<std::pair<std::string, std::vector<double>>> stages;
+  pipeline::FrameTimes times;
   pipeline::RunControl control;
-  control.on_frame = [&](int frame, double seconds, const pipeline::StageSeconds& parts) {
-    if (frame < common.frames.first) return;
-    frames.push_back(1e3 * seconds);
-    if (stages.empty())
-      for (const auto& [name, spent] : parts) stages.push_back({name, {}});
-    for (std::size_t k = 0; k < parts.size() && k < stages.size(); ++k)
-      stages[k].second.push_back(1e3 * parts[k].second);
+  control.on_frame = [&](int frame, double seconds, const pipeline::StageSeconds& stages) {
+    if (frame >= common.frames.first) times.add(seconds, stages);
   };
   Timed timed;
   for (int repeat = 0; repeat < common.repeats; ++repeat) {
     const auto simulation = pipeline::Simulation::create(variant.scene, variant.machine.options);
-    Discard sink;
+    pipeline::DiscardFrames sink;
     timed.outcome = run(*simulation, common, sink, control);
     if (timed.outcome.ending != Ending::kComplete) return timed;
   }
-  timed.frames = static_cast<std::int64_t>(frames.size());
-  timed.milliseconds = median(frames);
-  for (auto& [name, spent] : stages) timed.stages.emplace_back(name, median(std::move(spent)));
+  timed.frames = static_cast<std::int64_t>(times.frames());
+  timed.milliseconds = times.milliseconds(), timed.stages = times.stage_milliseconds();
   return timed;
 }
 

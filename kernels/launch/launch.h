@@ -23,7 +23,7 @@ struct KernelTable {
 
 enum class InstructionSet { kGeneric, kAvx2, kAvx512 };
 
-inline constexpr int kMostScratchReals = 80;  // a particle, enough for every step of every model
+inline constexpr int kMostScratchReals = 100;  // a particle, enough for every step of every model
 inline std::int64_t scratch_reals(int particles) {
   return static_cast<std::int64_t>(particles) * kLanes * kMostScratchReals;
 }

@@ -16,7 +16,7 @@ namespace ringlet::kernels {
 inline namespace RINGLET_ISA {
 
 inline constexpr int kBand = 3;
-inline constexpr int kFactorReals = 9 * kBand + 3 + 3;  // L_a, l, and d^-1 z of one particle
+inline constexpr int kFactorReals = 9 * kBand + 3 + 3 + 3;  // L_a, l, d^-1 z and d^-1 of one particle
 
 template <class R>
 RINGLET_KERNEL Matrix3<R> zero_matrix() {
@@ -114,6 +114,7 @@ RINGLET_KERNEL void eliminate(BandWindow<R>& w, Scalar<R>* factor, int stride) {
 
   store3<R>(factor + 27 * stride, stride, {l10, l20, l21});
   store3<R>(factor + 30 * stride, stride, {b.x * inv0, z1 * inv1, z2 * inv2});
+  store3<R>(factor + 33 * stride, stride, {inv0, inv1, inv2});
 
   Matrix3<R> upper[kBand], lower[kBand];  // W_a and L_a
   RINGLET_UNROLL
@@ -140,17 +141,35 @@ RINGLET_KERNEL void eliminate(BandWindow<R>& w, Scalar<R>* factor, int stride) {
   subtract_product(w.next_32, lower[2], upper[1]);
 }
 
-// x_i from the factor and the solutions after it, `later[a]` = x_{i+1+a}.
+// The stored factor with another right-hand side: b_i becomes d^-1 z_i, `after` the b of the next particles.
 template <class R>
-RINGLET_KERNEL Vector3<R> substitute_back(const Vector3<R>* later, const Scalar<R>* factor, int stride) {
-  Vector3<R> y = load3<R>(factor + 30 * stride, stride);
+RINGLET_KERNEL void eliminate_again(Vector3<R> b, Vector3<R> (&after)[kBand], Scalar<R>* factor, int stride) {
+  const Vector3<R> l = load3<R>(factor + 27 * stride, stride), d = load3<R>(factor + 33 * stride, stride);
+  const R z1 = fnma(l.x, b.x, b.y);
+  const R z2 = fnma(l.z, z1, fnma(l.y, b.x, b.z));
+  store3<R>(factor + 30 * stride, stride, {b.x * d.x, z1 * d.y, z2 * d.z});
   RINGLET_UNROLL
   for (int a = 0; a < kBand; ++a) {
     const auto entry = [&](int k) { return load<R>(factor + (9 * a + k) * stride); };
+    Vector3<R>& right = after[a];
+    right.x = fnma(entry(2), z2, fnma(entry(1), z1, fnma(entry(0), b.x, right.x)));
+    right.y = fnma(entry(5), z2, fnma(entry(4), z1, fnma(entry(3), b.x, right.y)));
+    right.z = fnma(entry(8), z2, fnma(entry(7), z1, fnma(entry(6), b.x, right.z)));
+  }
+}
+
+// x_i from the factor and the solutions after it, `later[a]` = x_{i+1+a}.
+template <class R>
+RINGLET_KERNEL Vector3<R> substitute_back(const Vector3<R>* later, const Scalar<R>* factor, int stride) {
+  // The latest solution last, its last component first: the next particle waits for nothing else.
+  Vector3<R> y = load3<R>(factor + 30 * stride, stride);
+  RINGLET_UNROLL
+  for (int a = kBand - 1; a >= 0; --a) {
+    const auto entry = [&](int k) { return load<R>(factor + (9 * a + k) * stride); };
     const Vector3<R> x = later[a];
-    y.x = fnma(entry(6), x.z, fnma(entry(3), x.y, fnma(entry(0), x.x, y.x)));
-    y.y = fnma(entry(7), x.z, fnma(entry(4), x.y, fnma(entry(1), x.x, y.y)));
-    y.z = fnma(entry(8), x.z, fnma(entry(5), x.y, fnma(entry(2), x.x, y.z)));
+    y.x = fnma(entry(0), x.x, fnma(entry(3), x.y, fnma(entry(6), x.z, y.x)));
+    y.y = fnma(entry(1), x.x, fnma(entry(4), x.y, fnma(entry(7), x.z, y.y)));
+    y.z = fnma(entry(2), x.x, fnma(entry(5), x.y, fnma(entry(8), x.z, y.z)));
   }
   const Vector3<R> l = load3<R>(factor + 27 * stride, stride);
   const R x1 = fnma(l.z, y.z, y.y);

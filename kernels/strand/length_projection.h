@@ -28,7 +28,8 @@ struct ProjectedStrand {
   R count;        // particles of each lane
   int clamped;
 };
-inline constexpr int kProjectionReals = 5;  // per segment: direction, link to the segment before, multiplier
+// Per segment: direction, link to the segment before, multiplier, inverse of its pivot.
+inline constexpr int kProjectionReals = 6;
 
 // How much of its freedom a particle in contact keeps along the normal: little, so that the system stays
 // regular where a segment stands straight on the surface.
@@ -79,6 +80,7 @@ RINGLET_FUNCTION R eliminate_lengths(const ProjectedStrand<R>& s) {
     store3<R>(row, s.stride, direction);
     store(row + 3 * s.stride, carry);
     store(row + 4 * s.stride, reduced);
+    store(row + 5 * s.stride, inverse);
     previous = direction;
     here = next;
   }

@@ -22,10 +22,12 @@ struct ChainArrays {
   RINGLET_KERNEL const StrandArrays<R>& of(int node) const { return node % 2 ? companions : hair; }
   RINGLET_KERNEL Vector3<R> position_at(int node) const { return of(node).position_at(node / 2); }
   RINGLET_KERNEL Vector3<R> velocity_at(int node) const { return of(node).velocity_at(node / 2); }
+  RINGLET_KERNEL void put(int node, Vector3<R> x, Vector3<R> v) const { of(node).put(node / 2, x, v); }
 };
 
-// Scratch of a pack, values a particle: factor, new position and new velocity of two nodes.
-inline constexpr int kMassSpringReals = 2 * (kFactorReals + 3 + 3);
+// Scratch of a pack, values a particle: factor, new position, new velocity and displacement of two nodes, and
+// what the lengths of one segment need.
+inline constexpr int kMassSpringReals = 2 * (kFactorReals + 3 + 3 + 3) + kStepLengthReals;
 
 // How a mass-spring strand takes a step; `Extra` as for AMS, elongation excepted.
 template <class Extra, class R>
@@ -161,10 +163,20 @@ struct MassSpring {
         v = substitute_back(later, factor + kFactorReals * node * stride, stride);
         x = fma(h, v, from.position_at(node) - root.displacement);
       }
-      to.of(node).put(node / 2, select(lives(node), x, zero3<R>()), select(lives(node), v, zero3<R>()));
+      to.put(node, select(lives(node), x, zero3<R>()), select(lives(node), v, zero3<R>()));
       later[2] = later[1], later[1] = later[0], later[0] = v;
     }
-    return project_stepped(s, step.parameters, h, to.hair, factor, active, last_try);
+    const int rows = s.particles * stride;
+    T *moved = to.companions.velocity + 3 * rows, *tension = moved + 6 * rows;
+    T* projection = step.parameters.lengths_in_step ? tension + 3 * rows : factor;
+    const TensionedChain<2, Arrays, R> chain{stepped_strand(s, step.parameters, h, to.hair, projection),
+                                             to,
+                                             last(),
+                                             clamped(),
+                                             factor,
+                                             tension,
+                                             moved};
+    return hold_step_lengths(s, step.parameters, h, chain, active, last_try);
   }
 
   RINGLET_KERNEL R write_back(const Arrays& from, const Arrays& to, Mask<R> done) const {

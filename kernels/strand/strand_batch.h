@@ -61,6 +61,7 @@ struct StrandParameters {
   std::int32_t clamped;  // prescribed particles at the root: 1 hinged, 2 tangent clamped (0 free, in tests)
   std::int32_t length_iterations;  // Newton iterations of the length projection; 0: none
   T length_tolerance;              // largest edge strain it leaves [-]
+  bool lengths_in_step;            // corrected in the metric of the step first; otherwise by masses alone
   std::int32_t skipped_substeps;   // since lengths were last projected: their displacement took all of these
   T strain_limit;                  // beyond either limit the strand counts as diverged
   T speed_limit;                   // [m/s]

@@ -12,14 +12,14 @@
 #include "kernels/strand/couplings.h"
 #include "kernels/strand/elongation.h"
 #include "kernels/strand/length_projection.h"
+#include "kernels/strand/step_lengths.h"
 #include "kernels/strand/strand_batch.h"
 
 namespace ringlet::kernels {
 inline namespace RINGLET_ISA {
 
-// Scratch of one pack: per particle the factor (whose place the projection reuses), the new position and the
-// new velocity.
-inline constexpr int kStepReals = kFactorReals + 3 + 3;
+// Scratch of one pack: per particle the factor, the new position, the new velocity and what lengths need.
+inline constexpr int kStepReals = kFactorReals + 3 + 3 + 3 + kStepLengthReals;
 
 template <class R>
 struct RootMotion {
@@ -271,24 +271,47 @@ struct SubstepResult {
   R strain, iterations;
 };
 
-// The lengths of a step h that led to `to`. `scratch` holds kProjectionReals values a particle, `to.stride`
-// apart. `last_try`: strands are not to try again, what is off is laid out.
+// The strand after a step h that led to `to`, as the projection sees it. `scratch` holds kProjectionReals
+// values a particle, `to.stride` apart.
 template <class R>
-RINGLET_KERNEL SubstepResult<R> project_stepped(const StrandPack<R>& s, const StrandParameters<Scalar<R>>& p,
-                                                R h, const StrandArrays<R>& to, Scalar<R>* scratch,
-                                                Mask<R> active, bool last_try) {
-  const ProjectedStrand<R> lengths{
-      to.position,   to.velocity, R(1) / (h * R(Scalar<R>(1 + p.skipped_substeps))),
-      s.rest_length, kLanes,      nullptr,
-      scratch,       to.stride,   s.particles,
-      s.count,       p.clamped};
-  ProjectionResult<R> result = project_lengths(lengths, R(p.length_tolerance), p.length_iterations, active);
-  const Mask<R> late = active & (result.strain > R(p.length_tolerance));
+RINGLET_KERNEL ProjectedStrand<R> stepped_strand(const StrandPack<R>& s, const StrandParameters<Scalar<R>>& p,
+                                                 R h, const StrandArrays<R>& to, Scalar<R>* scratch) {
+  const R per_h = R(1) / (h * R(Scalar<R>(1 + p.skipped_substeps)));
+  return {to.position, to.velocity, per_h,       s.rest_length, kLanes,   nullptr,
+          scratch,     to.stride,   s.particles, s.count,       p.clamped};
+}
+
+// Holds the lengths of a step h: by the step's own matrix first, what is left by masses. `last_try`: strands
+// are not to try again, what is still off is laid out.
+template <class Chain, class R>
+RINGLET_KERNEL SubstepResult<R> hold_step_lengths(const StrandPack<R>& s,
+                                                  const StrandParameters<Scalar<R>>& p, R h,
+                                                  const Chain& chain, Mask<R> active, bool last_try) {
+  const R tolerance = R(p.length_tolerance);
+  const ProjectedStrand<R>& lengths = chain.lengths;
+  const R total = h * (h + R(p.damping));
+  const auto stiffness = [&](int segment) { return total * s.kappa(p, segment, kEdge); };
+  R strain = eliminate_lengths(lengths), iterations = R(0);
+  Mask<R> open = active & (strain > tolerance);
+  int corrections = 0;
+  const int most = p.lengths_in_step ? kStepCorrections : 0;
+  for (; corrections < most && corrections < p.length_iterations && any(open); ++corrections) {
+    correct_lengths(chain, open, stiffness);
+    strain = eliminate_lengths(lengths);
+    iterations = iterations + select(open, R(1), R(0));
+    open = open & (strain > tolerance);
+  }
+  if (any(open)) {
+    const ProjectionResult<R> rest =
+        project_lengths(lengths, tolerance, p.length_iterations - corrections, open);
+    strain = rest.strain, iterations = iterations + rest.iterations;
+  }
+  const Mask<R> late = open & (strain > tolerance);
   if (last_try && p.length_iterations > 0 && any(late)) {
     lay_out_lengths(lengths, late);
-    result.strain = eliminate_lengths(lengths);
+    strain = eliminate_lengths(lengths);
   }
-  return {result.strain, result.iterations};
+  return {strain, iterations};
 }
 
 // A strand whose lengths did not come within the tolerance takes the step again in 2, 4, ... up to this many
@@ -332,8 +355,7 @@ struct AugmentedMassSpring {
   }
 
   // One step h from the state in `from` to that in `to` (which may be the same): velocities, positions
-  // relative to the moved root, lengths with their velocity correction. `factor` holds kFactorReals values a
-  // particle, `to.stride` apart.
+  // relative to the moved root, lengths with their velocity correction. `factor` is the pack's scratch.
   RINGLET_KERNEL SubstepResult<R> advance(const RootMotion<R>& root, R h, const Arrays& from,
                                           const Arrays& to, T* factor, Mask<R> active, bool last_try) const {
     const StrandParameters<T>& p = step.parameters;
@@ -355,7 +377,13 @@ struct AugmentedMassSpring {
       to.put(i, select(lives, x, zero3<R>()), select(lives, v, zero3<R>()));
       later[2] = later[1], later[1] = later[0], later[0] = v;
     }
-    return project_stepped(s, p, h, to, factor, active, last_try);
+    const int rows = s.particles * stride;
+    T *moved = to.velocity + 3 * rows, *tension = moved + 3 * rows;
+    T* projection =
+        p.lengths_in_step ? tension + 3 * rows : factor;  // by masses alone nobody asks for the factor
+    const TensionedChain<1, Arrays, R> chain{
+        stepped_strand(s, p, h, to, projection), to, s.particles, p.clamped, factor, tension, moved};
+    return hold_step_lengths(s, p, h, chain, active, last_try);
   }
 
   RINGLET_KERNEL R write_back(const Arrays& from, const Arrays& to, Mask<R> done) const {

@@ -302,7 +302,10 @@ class Builder {
   }
 
   static Inextensible inextensible(const Json& block) {
-    return {block["tolerance"], block["max_iterations"], cadence(block["per"])};
+    const auto metric = word<LengthMetric>(
+        block["metric"],
+        {{"auto", LengthMetric::kAuto}, {"step", LengthMetric::kStep}, {"mass", LengthMetric::kMass}});
+    return {block["tolerance"], block["max_iterations"], metric, cadence(block["per"])};
   }
 
   static HairHair hair_hair(const Json& block) {

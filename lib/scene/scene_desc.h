@@ -221,9 +221,14 @@ struct Model {
 
 enum class Cadence { kSubstep, kFrame };
 
+// What corrections of lengths are least in. kAuto: kStep where substeps are chosen by a tolerance, else
+// kMass.
+enum class LengthMetric { kAuto, kStep, kMass };
+
 struct Inextensible {
   double tolerance;    // largest edge strain left by the projection [-]
   int max_iterations;  // Newton iterations; a strand that needs more takes more substeps
+  LengthMetric metric;
   Cadence cadence;
 };
 

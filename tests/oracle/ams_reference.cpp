@@ -355,6 +355,32 @@ Points project_lengths_successively(const Strand& strand, Points x, double toler
   return x;
 }
 
+Points correct_lengths(const Strand& strand, const State& before, const Step& step, const Points& x,
+                       int iterations) {
+  const std::vector<int> segments = constrained_segments(strand, x);
+  if (segments.empty()) return x;
+  const Constraints c = constraints(strand, x, segments);
+  const Eigen::MatrixXd response = assemble(strand, before, step).matrix.llt().solve(c.gradient.transpose());
+  const Eigen::VectorXd inverse_mass = movable_masses(strand).cwiseInverse();
+  Eigen::MatrixXd stiffness = (c.gradient * inverse_mass.asDiagonal() * c.gradient.transpose()).inverse();
+  for (Eigen::Index row = 0; row < c.value.size(); ++row)
+    stiffness(row, row) += step.h * (step.h + strand.damping) * strand.edge[segments[row] - 1];
+
+  Eigen::VectorXd tension = Eigen::VectorXd::Zero(c.value.size()), residual = c.value, search = tension;
+  double last = 1;
+  for (int i = 0; i < iterations && residual.norm() > 0; ++i) {
+    const Eigen::VectorXd image = stiffness * residual;
+    const double product = image.dot(residual);
+    search = i == 0 ? image : Eigen::VectorXd(image + product / last * search);
+    const Eigen::VectorXd shortened = c.gradient * (response * search);
+    const double along = product / search.dot(shortened);
+    tension += along * search, residual -= along * shortened, last = product;
+  }
+  Points corrected = x;
+  corrected.rightCols(strand.size() - clamped_count(strand)) -= unflat(response * tension);
+  return corrected;
+}
+
 Points project_lengths(const Strand& strand, const Points& start) {
   constexpr double kTolerance = 1e-12;
   constexpr int kMaxIterations = 200;

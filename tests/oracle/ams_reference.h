@@ -122,6 +122,13 @@ Points project_lengths(const Strand& strand, const Points& x);
 Points project_lengths_successively(const Strand& strand, Points x, double tolerance, int max_iterations,
                                     int* iterations = nullptr);
 
+// The same constraint approached in the metric of an implicit step that led to x: the tensions that bring the
+// lengths back to first order, (J A^-1 J^T) lambda = C, x -= A^-1 J^T lambda, A the step's matrix, by so many
+// iterations of conjugate gradients that are preconditioned by the masses' stiffness plus the segments' own.
+// As many as there are segments solve it.
+Points correct_lengths(const Strand& strand, const State& before, const Step& step, const Points& x,
+                       int iterations);
+
 // Positions replaced by `projected`, velocities corrected by the displacement over h.
 State with_projected(const State& state, const Points& projected, double h);
 

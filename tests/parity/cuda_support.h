@@ -27,6 +27,7 @@ inline kernels::StrandParameters<float> default_parameters() {
           .clamped = 1,
           .length_iterations = 3,
           .length_tolerance = 1e-4f,
+          .lengths_in_step = true,
           .skipped_substeps = 0,
           .strain_limit = 10,
           .speed_limit = 1000};

@@ -45,7 +45,7 @@ class KernelBits : public OnMachine<Machine> {
     for (const std::size_t k : which) strands.push_back(crowd.strands[k]), poses.push_back(crowd.before[k]);
     strands[0].drag = 1, strands[0].damping = 1.0 / 60;  // for all
     StrandRun<On> run(strands, poses, true, springs);
-    run.parameters.length_iterations = 3;
+    run.parameters.length_iterations = 3, run.parameters.lengths_in_step = true;
     run.soften({1, 0.01, 0.2, {0.01}, {{0.01, 1, -2, 0}}}, true);
     run.blow({3, 1, -2}, {nullptr, {40, 9}, {20, 1}});
     for (std::size_t k = 0; k < which.size(); ++k) run.set(k, crowd.states[which[k]]);

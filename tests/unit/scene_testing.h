@@ -124,7 +124,7 @@ class SceneTest : public testing::Test {
       },
       "effects": {
         "gravity": [0, 0, -9.81],
-        "inextensible": {"tolerance": 1e-3, "max_iterations": 5, "per": "frame"},
+        "inextensible": {"tolerance": 1e-3, "max_iterations": 5, "metric": "mass", "per": "frame"},
         "non_hookean": {"memory": "reversible", "curve": [[0.25, 0.25], [0.5, 0.375]]},
         "wind": {
           "velocity": [1, 0, 0],

@@ -29,6 +29,8 @@ kernels::StrandParameters<T> strand_parameters(const scene::Scene& scene) {
   if (const auto& lengths = scene.effects.inextensible) {
     p.length_iterations = lengths->max_iterations;
     p.length_tolerance = static_cast<T>(lengths->tolerance);
+    p.lengths_in_step = lengths->metric == scene::LengthMetric::kStep ||
+                        (lengths->metric == scene::LengthMetric::kAuto && model.substep_choice);
   }
   p.strain_limit = static_cast<T>(scene.limits.edge_strain);
   p.speed_limit = static_cast<T>(scene.limits.speed);

@@ -62,6 +62,11 @@ class Running {
                          options.reference_cap};
     plan.overrides.insert(plan.overrides.end(), options.reference.begin(), options.reference.end());
     reference_.emplace(std::move(plan), study_.levels);
+    for (const std::string& setting : options.reference)
+      if (of_frames(setting.substr(0, setting.find('='))))
+        throw Error(ErrorKind::kUsage, "--reference " + setting,
+                    "frames of the same number would be of different times, which are not compared",
+                    "--set changes the times of all runs and the reference, --frames takes other frames");
     std::vector<std::string> overrides = options.base.overrides;
     overrides.insert(overrides.end(), options.reference.begin(), options.reference.end());
     scene::load(options.base.file, {overrides, "--reference"});

@@ -324,6 +324,8 @@ def test_bad_values_are_told_before_anything_runs(program, scene, tmp_path, vary
         ("--target=0", "--target: found `0`"),
         ("--frames=3-1", "--frames"),
         ("--reference=/model/x=1", "#/model/x: found an unknown key"),
+        ("--reference=/frames/fps=48", "--reference /frames/fps=48: frames of the same number would be of different times"),
+        ('--reference=/frames={"last":9}', "of different times, which are not compared (--set changes the times of all runs"),
         ("--frames=1-1", "no frame of these is stepped"),
     ],
 )

@@ -1,4 +1,5 @@
-ringlet_test(kernels ringlet::kernels ringlet::state ringlet::oracle)
+# The problem of known solution that studies too solve.
+ringlet_test(kernels ringlet::kernels ringlet::state ringlet::oracle ringlet::study)
 
 add_executable(bench_kernels ${CMAKE_CURRENT_LIST_DIR}/bench/bench_kernels.cpp
                              ${CMAKE_CURRENT_LIST_DIR}/bench/bench_contacts.cpp

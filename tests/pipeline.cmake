@@ -1,1 +1,1 @@
-ringlet_test(pipeline ringlet::pipeline ringlet::oracle TBB::tbb)
+ringlet_test(pipeline ringlet::pipeline ringlet::oracle TBB::tbb nlohmann_json::nlohmann_json)

@@ -13,15 +13,9 @@
 // double: across a hundred cells of hair the pressure is a thousand times the differences it makes.
 #pragma once
 #include "kernels/grid/multigrid.h"
+#include "kernels/grid/pressure_problem.h"
 
 namespace ringlet::kernels {
-
-struct PressureFigures {
-  int iterations = 0;       // of conjugate gradients, over all sets
-  int sets = 0;             // that were solved on
-  double residual = 0;      // relative, left
-  bool compressed = false;  // there was something to do
-};
 
 inline namespace RINGLET_ISA {
 
@@ -44,6 +38,23 @@ struct Pressure {
     direction.resize(n), image.resize(n), violation.resize(n);
   }
   void prepare(Backend& backend) { multigrid.build(backend); }
+
+  // All of that from a problem of the host's.
+  void set(Backend& backend, const PressureProblem<T>& problem) {
+    auto& fine = multigrid.level[0];
+    fine.resize(problem.cells), resize(problem.cells);
+    std::uint64_t* key = fine.key.data();
+    std::int32_t* neighbour = fine.neighbour.data();
+    T *c = face.data(), *all = open.data(), *b = right.data();
+    backend.parallel_for("pressure: set", problem.cells, [=] RINGLET_LAMBDA(int i) {
+      key[i] = problem.key[i], all[i] = problem.open[i], b[i] = problem.right[i];
+      for (int d = 0; d < kDirections; ++d) {
+        const std::int64_t at = static_cast<std::int64_t>(d) * problem.cells + i;
+        neighbour[at] = problem.neighbour[at], c[at] = problem.face[at];
+      }
+    });
+    prepare(backend);
+  }
 
   // What could not be reached in `most_iterations` is told by the figures.
   PressureFigures solve(Backend& backend, double tolerance, int most_iterations) {

@@ -1,15 +1,20 @@
-// Hair against hair: which instruction set's grid and contacts a processor gets.
+// Hair against hair: which instruction set's grid, its pressure alone and contacts a processor gets.
 #include "kernels/launch/hair_contacts.h"
 #include "kernels/launch/hair_grid.h"
+#include "kernels/launch/pressure.h"
 
 namespace ringlet::kernels {
 
-#define RINGLET_DECLARE(isa)                                      \
-  namespace isa {                                                 \
-  HairGrid<float>* new_float_grid(HostThreads threads);           \
-  HairGrid<double>* new_double_grid(HostThreads threads);         \
-  HairContacts<float>* new_float_contacts(HostThreads threads);   \
-  HairContacts<double>* new_double_contacts(HostThreads threads); \
+#define RINGLET_DECLARE(isa)                                                                         \
+  namespace isa {                                                                                    \
+  HairGrid<float>* new_float_grid(HostThreads threads);                                              \
+  HairGrid<double>* new_double_grid(HostThreads threads);                                            \
+  HairContacts<float>* new_float_contacts(HostThreads threads);                                      \
+  HairContacts<double>* new_double_contacts(HostThreads threads);                                    \
+  PressureFigures solve_float_pressure(HostThreads threads, const PressureProblem<float>& problem,   \
+                                       double residual, int most_iterations, double* answer);        \
+  PressureFigures solve_double_pressure(HostThreads threads, const PressureProblem<double>& problem, \
+                                        double residual, int most_iterations, double* answer);       \
   }
 RINGLET_DECLARE(generic)
 RINGLET_DECLARE(avx2)
@@ -28,16 +33,18 @@ template class HairContacts<double>;
 
 namespace {
 
+template <class Function>
+Function choose(InstructionSet set, Function generic, Function avx2, Function avx512) {
+  return set == InstructionSet::kAvx512 ? avx512 : set == InstructionSet::kAvx2 ? avx2 : generic;
+}
+
 template <class Made>
 using Maker = Made* (*)(HostThreads threads);
 
 template <class Made>
 std::unique_ptr<Made> make(InstructionSet set, HostThreads threads, Maker<Made> generic, Maker<Made> avx2,
                            Maker<Made> avx512) {
-  const Maker<Made> maker = set == InstructionSet::kAvx512 ? avx512
-                            : set == InstructionSet::kAvx2 ? avx2
-                                                           : generic;
-  return std::unique_ptr<Made>(maker(threads));
+  return std::unique_ptr<Made>(choose(set, generic, avx2, avx512)(threads));
 }
 
 }  // namespace
@@ -61,6 +68,22 @@ template <>
 std::unique_ptr<HairContacts<double>> make_hair_contacts(InstructionSet set, HostThreads threads) {
   return make<HairContacts<double>>(set, threads, generic::new_double_contacts, avx2::new_double_contacts,
                                     avx512::new_double_contacts);
+}
+
+template <>
+PressureFigures solve_pressure(InstructionSet set, HostThreads threads, const PressureProblem<float>& problem,
+                               double residual, int most_iterations, double* pressure) {
+  const auto solve =
+      choose(set, generic::solve_float_pressure, avx2::solve_float_pressure, avx512::solve_float_pressure);
+  return solve(threads, problem, residual, most_iterations, pressure);
+}
+template <>
+PressureFigures solve_pressure(InstructionSet set, HostThreads threads,
+                               const PressureProblem<double>& problem, double residual, int most_iterations,
+                               double* pressure) {
+  const auto solve =
+      choose(set, generic::solve_double_pressure, avx2::solve_double_pressure, avx512::solve_double_pressure);
+  return solve(threads, problem, residual, most_iterations, pressure);
 }
 
 }  // namespace ringlet::kernels

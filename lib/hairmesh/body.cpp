@@ -134,6 +134,7 @@ void Body<T>::assemble(double step, std::span<const Pose> roots, const Vec3& gra
     told.air = air_.data();
   }
   step_ = step;
+  ++launches_;
   solver_->assemble(told);
 }
 
@@ -164,6 +165,7 @@ void Body<T>::carry(std::span<const kernels::SolidView> solids,
 
 template <class T>
 void Body<T>::solve(FrameFigures& figures) {
+  ++launches_;
   const kernels::SolveFigures took = solver_->solve();
   figures.solves += 1, figures.iterations += took.iterations;
   figures.residual = worse(figures.residual, took.residual);
@@ -176,10 +178,13 @@ void Body<T>::collide(std::span<const kernels::SolidView> solids,
   kernels::MeshContactFigures all;  // each call tells of all so far
   for (const kernels::SolidView& solid : solids) {
     const SolidCollider<T> collider(solid, origin_, step_);
+    ++launches_;
     all = solver_->collide(kernels::mesh_surface<T>(collider));
   }
-  if (!ellipsoids.empty())
+  if (!ellipsoids.empty()) {
+    ++launches_;
     all = solver_->collide(ellipsoids.data(), static_cast<std::int32_t>(ellipsoids.size()));
+  }
   figures.touched = std::max(figures.touched, static_cast<double>(all.touched));
   figures.corrected = std::max(figures.corrected, static_cast<double>(all.corrected));
   figures.depth = std::max(figures.depth, all.depth);
@@ -188,6 +193,7 @@ void Body<T>::collide(std::span<const kernels::SolidView> solids,
 
 template <class T>
 void Body<T>::minimise(FrameFigures& figures) {
+  ++launches_;
   const kernels::SolveFigures took = solver_->minimise();
   figures.minimisations += took.iterations > 0 ? 1 : 0;
   figures.minimise_iterations += took.iterations;
@@ -249,6 +255,12 @@ std::size_t Body<T>::bytes() const {
   return solver_->bytes() +
          (rest_.size() + rest_roots_.size() + positions_.size() + velocities_.size()) * sizeof(Vec3) +
          (solver_positions_.size() + solver_velocities_.size() + roots_.size() + air_.size()) * sizeof(T);
+}
+
+template <class T>
+std::size_t Body<T>::checkpoint_bytes(bool touches) const {
+  return (solver_positions_.size() + solver_velocities_.size()) * sizeof(T) +
+         (touches ? positions_.size() * sizeof(kernels::MeshContact<T>) : 0);
 }
 
 template <class T>

@@ -2,6 +2,7 @@
 // kernels/hairmesh in the scene's terms.
 #pragma once
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>
@@ -73,6 +74,10 @@ class Body {
   double strain() const;
   double speed() const;  // largest [m/s]
   std::size_t bytes() const;
+  // Of what `save` writes, with contacts of all vertices where `touches`.
+  std::size_t checkpoint_bytes(bool touches) const;
+  // Kernels of the solver that substeps called, so far.
+  std::int64_t launches() const { return launches_; }
 
   // Into and out of a checkpoint, under names that end in `suffix`. Throws Error{kInput} for arrays of
   // another size.
@@ -94,6 +99,7 @@ class Body {
   std::unique_ptr<kernels::HairMeshSolver<T>> solver_;
   double rest_volume_;
   double step_ = 0;
+  std::int64_t launches_ = 0;
   std::vector<Vec3> positions_, velocities_;
   std::vector<T> solver_positions_, solver_velocities_, roots_, air_;
 };

@@ -98,6 +98,7 @@ class HairMeshSimulation : public Simulation {
   }
 
   void make_plan(std::int64_t strands, std::int64_t particles);
+  std::size_t bytes_of_tries() const;
   void step_frame(int frame);
   void warn_of_residual(int frame);
   void take_frame(int frame, int substeps);
@@ -117,11 +118,19 @@ class HairMeshSimulation : public Simulation {
   void resume(const state::Snapshot& snapshot);
   void set_state(const state::Snapshot& snapshot);
 
+  std::int64_t launches() const;
+
   template <class Work>
   void timed(const char* name, const Work& work) {
     const Timer timer;
-    const trace::Span span(name, "stage");
+    trace::Span span(name, "stage");
+    const std::int64_t before = launches();
     work();
+    if (span.recorded()) {
+      span.tell("launches", static_cast<double>(launches() - before));
+      for (const PlannedStage& stage : plan_.stages)
+        if (stage.name == name) span.tell("bytes", static_cast<double>(stage.bytes));
+    }
     for (auto& [stage, spent] : seconds_)
       if (stage == name) spent += timer.seconds();
   }
@@ -136,14 +145,24 @@ class HairMeshSimulation : public Simulation {
   hairmesh::FrameFigures taken_;
   bool warned_ = false;  // of a residual
   StageSeconds seconds_;
+  std::int64_t launches_ = 0;              // beside those of the bodies
   std::optional<SubstepControl> control_;  // where the scene leaves the substeps to it
   std::function<void(const std::string&, int, int, state::Snapshot&)> probe_;
   Plan plan_;
 };
 
+// A launch is a kernel of the solver, or a pass over a groom's columns, vertices or strands.
+template <class T>
+std::int64_t HairMeshSimulation<T>::launches() const {
+  std::int64_t sum = launches_;
+  for (const Part<T>& part : parts_) sum += part.body.launches();
+  return sum;
+}
+
 template <class T>
 void HairMeshSimulation<T>::make_plan(std::int64_t strands, std::int64_t particles) {
-  plan_ = frames_planned(scene_, control_ ? &*control_ : nullptr);
+  const SubstepControl* control = control_ ? &*control_ : nullptr;
+  plan_ = frames_planned(scene_, control);
   plan_.strands = strands, plan_.particles = particles;
   std::size_t bodies = 0, roots = 0, air = 0, generators = (points_.size() + speeds_.size()) * sizeof(Vec3),
               solids = 0;
@@ -153,24 +172,53 @@ void HairMeshSimulation<T>::make_plan(std::int64_t strands, std::int64_t particl
     generators += part.strands.bytes();
   }
   for (const solids::Solid& solid : world_.solids) solids += solid.bytes();
-  const auto add = [&](const char* name, const char* what, bool runs, std::size_t bytes) {
-    plan_.stages.push_back({name, what, runs, runs ? bytes : 0, {0, 0}});  // no kernels of a device
+  const auto add = [&](const char* name, const char* what, bool runs, std::size_t bytes,
+                       effects::Launches launches) {
+    plan_.stages.push_back({name, what, runs, runs ? bytes : 0, runs ? launches : effects::Launches{0, 0}});
     if (runs) seconds_.emplace_back(name, 0.0);
   };
-  add("roots", "the scalp's vertices carried by the head", true, roots);
-  add("wind", "mean wind, gusts, turbulence", wind_.has_value(), air);
-  add("forces", "stretch, shear, bend and volume of the hair mesh, its matrix", true, bodies);
-  add("solve", "implicit step by filtered conjugate gradients", true, 0);
-  add("solids", "outer vertices moved out of level sets and ellipsoids, friction", has_solids(), solids);
+  const auto grooms = static_cast<std::int64_t>(parts_.size());
+  // Of a frame: so many for each groom and substep, or once.
+  const auto of_substeps = [&](std::int64_t each) {
+    return launches_of_run(plan_, control, [&](int substeps) {
+      return effects::Launches{grooms * each * substeps, grooms * each * substeps};
+    });
+  };
+  const effects::Launches each = of_substeps(1);
+  const effects::Launches once = launches_of_run(plan_, control, [&](int) {
+    return effects::Launches{grooms, grooms};
+  });
+  const std::int64_t shown =
+      grooms * (speeds_.empty() ? 1 : 2) * (scene_.frames.last - scene_.frames.first + 1);
+  add(kTries, kTriesAre, control != nullptr, bytes_of_tries(), {0, 0});
+  add("roots", "the scalp's vertices carried by the head", true, roots, each);
+  add("wind", "mean wind, gusts, turbulence", wind_.has_value(), air, each);
+  add("forces", "stretch, shear, bend and volume of the hair mesh, its matrix", true, bodies, each);
+  add("solve", "implicit step by filtered conjugate gradients", true, 0, each);
+  add("solids", "outer vertices moved out of level sets and ellipsoids, friction", has_solids(), solids,
+      of_substeps(static_cast<std::int64_t>(world_.solids.size()) +
+                  (scene_.model.hair_mesh->ellipsoids.empty() ? 0 : 1)));
   add("minimisation", "the rest of the mesh taken along",
-      has_solids() && scene_.model.hair_mesh->deformation_minimisation, 0);
-  add("strands", "strands through the layers, once a frame", true, generators);
+      has_solids() && scene_.model.hair_mesh->deformation_minimisation, 0, once);
+  add("strands", "strands through the layers, once a frame", true, generators, {shown, shown});
+}
+
+// A checkpoint of the frame's start, contacts of all vertices where there may be some, and what tries led to.
+template <class T>
+std::size_t HairMeshSimulation<T>::bytes_of_tries() const {
+  std::size_t bytes = 0, vertices = 0;
+  for (const Part<T>& part : parts_) {
+    vertices += part.body.positions().size();
+    bytes += part.body.checkpoint_bytes(has_solids());
+  }
+  return bytes + SubstepControl::bytes(3 * vertices);
 }
 
 template <class T>
 void HairMeshSimulation<T>::blow(double time) {
   const kernels::WindField<double> field = wind_->at<double>(time);
-  for (Part<T>& part : parts_)
+  for (Part<T>& part : parts_) {
+    ++launches_;
     tbb::parallel_for(std::size_t{0}, part.air.size(), [&](std::size_t v) {
       const Vec3& x = part.body.positions()[v];
       const kernels::Vector3<double> air = kernels::air_velocity(
@@ -178,6 +226,7 @@ void HairMeshSimulation<T>::blow(double time) {
                                           x.z() - field.origin[2]});
       part.air[v] = {air.x, air.y, air.z};
     });
+  }
 }
 
 // How the head as a whole has been carried from rest.
@@ -217,7 +266,7 @@ void HairMeshSimulation<T>::move_solids(double before, double now) {
 template <class T>
 void HairMeshSimulation<T>::substep(int frame, double before, double now, bool last) {
   timed("roots", [&] {
-    for (Part<T>& part : parts_) part.roots.pose(now, part.poses);
+    for (Part<T>& part : parts_) ++launches_, part.roots.pose(now, part.poses);
   });
   if (wind_) timed("wind", [&] { blow(now); });
   if (has_solids()) timed("solids", [&] { move_solids(before, now); });
@@ -245,11 +294,13 @@ template <class T>
 void HairMeshSimulation<T>::step_frame(int frame) {
   for (auto& [stage, spent] : seconds_) spent = 0;
   if (!control_) return take_frame(frame, scene_.model.substeps);
-  const state::Snapshot start = snapshot(frame - 1);
-  const std::vector<double> before = vertices();
+  state::Snapshot start;
+  timed(kTries, [&] { start = snapshot(frame - 1); });
+  double count = 0;
+  for (const Part<T>& part : parts_) count += static_cast<double>(part.body.positions().size());
   bool again = false;
-  control_->step(frame, static_cast<double>(before.size()) / 3, [&](int substeps) {
-    if (again) set_state(start);
+  control_->step(frame, count, [&](int substeps) {
+    if (again) timed(kTries, [&] { set_state(start); });
     again = true;
     take_frame(frame, substeps);
     return vertices();
@@ -270,6 +321,9 @@ void HairMeshSimulation<T>::take_frame(int frame, int substeps) {
 template <class T>
 std::vector<double> HairMeshSimulation<T>::vertices() const {
   std::vector<double> all;
+  std::size_t values = 0;
+  for (const Part<T>& part : parts_) values += 3 * part.body.positions().size();
+  all.reserve(values);
   for (const Part<T>& part : parts_)
     for (const Vec3& x : part.body.positions()) all.insert(all.end(), x.begin(), x.end());
   return all;
@@ -325,9 +379,12 @@ state::Frame HairMeshSimulation<T>::frame_now(int frame) {
   for (const Part<T>& part : parts_) {
     const auto first = static_cast<std::size_t>(part.first_particle),
                count = part.strands.size() * static_cast<std::size_t>(part.strands.points());
-    part.strands.place(part.body.positions(), std::span(points_).subspan(first, count));
-    if (!speeds_.empty())
-      part.strands.place(part.body.velocities(), std::span(speeds_).subspan(first, count));
+    const auto place = [&](std::span<const Vec3> vertices, std::vector<Vec3>& points) {
+      ++launches_;
+      part.strands.place(vertices, std::span(points).subspan(first, count));
+    };
+    place(part.body.positions(), points_);
+    if (!speeds_.empty()) place(part.body.velocities(), speeds_);
   }
   return make_frame(scene_, world_, points_, speeds_, frame, time_of(frame));
 }

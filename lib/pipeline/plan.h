@@ -29,6 +29,11 @@ struct Plan {
   std::vector<PlannedStage> stages;      // in the order they run
 };
 
+// The stage of frames that are taken more than once, where an error chooses the substeps.
+inline constexpr const char* kTries = "tries";
+inline constexpr const char* kTriesAre =
+    "a frame's start and what its tries led to, for substeps by tolerance";
+
 // A plan of the scene's frames and substeps, without stages. `control`: null where the substeps are fixed.
 Plan frames_planned(const scene::Scene& scene, const SubstepControl* control);
 

@@ -214,6 +214,12 @@ void TypedSimulation<T>::make_plan() {
     }
     plan_.stages.push_back(planned);
   };
+  const auto add_host = [&](const char* name, const char* what, bool runs, std::size_t bytes) {
+    plan_.stages.push_back({name, what, runs, runs ? bytes : 0, {0, 0}});  // no kernels of the device
+  };
+  add_host(kTries, kTriesAre, control != nullptr,
+           state_.bytes() + state_.air.size() * sizeof(T) + now_.size() * sizeof(Pose) +
+               SubstepControl::bytes(state_.position.size()));
   const auto of_roots = [&](int substeps) {
     return roots_.still() ? effects::Launches{0, 0} : effects::Launches{substeps, substeps};
   };
@@ -225,9 +231,6 @@ void TypedSimulation<T>::make_plan() {
   add("grid", "hair keeps its volume: density, pressure, friction");
   add("contacts", "hair against hair: segments touch, Coulomb friction");
   add("solids", "collision with level sets, friction");
-  const auto add_host = [&](const char* name, const char* what, bool runs, std::size_t bytes) {
-    plan_.stages.push_back({name, what, runs, runs ? bytes : 0, {0, 0}});  // no kernels of the device
-  };
   add_host("grooming", "trim, lengthen, comb, rest at their frames", grooming_.has_value(),
            grooming_ ? grooming_->bytes() : 0);
   add_host("interpolation", "strands that follow guides, once a frame", world_.interpolated != nullptr,
@@ -318,19 +321,23 @@ void TypedSimulation<T>::step_frame(int frame) {
 // checkpoint; the roots are where they were.
 template <class T>
 void TypedSimulation<T>::take_chosen(int frame) {
-  const state::StrandState<T> start = state_;
-  const std::vector<Pose> roots = now_;
+  std::optional<state::StrandState<T>> start;
+  std::vector<Pose> roots;
   state::Snapshot remembered;
-  for (const auto& stage : stages_) stage->save(remembered);
+  timed(kTries, [&] {
+    start.emplace(state_), roots = now_;
+    for (const auto& stage : stages_) stage->save(remembered);
+  });
   bool again = false;
   const double living = std::accumulate(model_.count.begin(), model_.count.end(), 0.0);
   control_->step(frame, living, [&](int substeps) {
-    if (again) {
-      state_ = start, now_ = roots;
-      executor_->submit(state_);
-      executor_->submit_roots(state_);
-      for (const auto& stage : stages_) stage->restore(remembered);
-    }
+    if (again)
+      timed(kTries, [&] {
+        state_ = *start, now_ = roots;
+        executor_->submit(state_);
+        executor_->submit_roots(state_);
+        for (const auto& stage : stages_) stage->restore(remembered);
+      });
     again = true;
     take_frame(frame, substeps);
     executor_->fetch(state_);

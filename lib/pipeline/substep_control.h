@@ -9,6 +9,7 @@
 // first of the next two. The next frame begins with the m that would have led to an e a little under the
 // tolerance. Nothing but the positions decides: runs on any number of threads choose the same.
 #pragma once
+#include <cstddef>
 #include <functional>
 #include <vector>
 
@@ -37,6 +38,9 @@ class SubstepControl {
   int most() const { return choice_.max; }
   // The tries of a frame whose first pair ends with at least `second` substeps and that goes on to the most.
   std::vector<int> tries(int second) const;
+
+  // What `step` holds where a try leads to so many values of positions [bytes].
+  static std::size_t bytes(std::size_t values) { return 2 * values * sizeof(double); }
 
   // Of the last frame: substeps kept, of all tries, the error left, 1 where it is above the tolerance.
   state::Figures figures() const;

@@ -89,12 +89,14 @@ std::string tail(const std::vector<std::string>& tokens, std::size_t count) {
 
 }  // namespace
 
+bool of_frames(const std::string& pointer) { return pointer == "/frames" || pointer.starts_with("/frames/"); }
+
 Axis parse_axis(const std::string& text) {
   const std::size_t equals = text.find('=');
   if (equals == std::string::npos)
     refuse(text, "expected POINTER=V1,V2,...", "for instance /model/substeps=1,2,4,8");
   Axis axis{text.substr(0, equals), {}};
-  if (axis.name == "/frames" || axis.name.starts_with("/frames/"))
+  if (of_frames(axis.name))
     refuse(text, "frames of the same number would be of different times, which are not compared",
            "--frames takes other frames, --set other times for all runs");
   for (const std::string& part : split(text.substr(equals + 1))) {

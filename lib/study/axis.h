@@ -29,6 +29,9 @@ struct Axis {
 // Error{kUsage}: no `=`, no value, neither a JSON pointer nor a setting, a value that the setting lacks.
 Axis parse_axis(const std::string& text);
 
+// Whether a pointer is to what frames there are and when: frames of the same number would be of other times.
+bool of_frames(const std::string& pointer);
+
 // Sets one of the command line's settings, whose value parse_axis has checked.
 void set_machine(const std::string& setting, const std::string& value, Machine& machine);
 

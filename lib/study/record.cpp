@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "core/error.h"
@@ -84,6 +85,27 @@ Out reference_json(const Study& study) {
             {"errors", errors(study.single.errors)}}}};
 }
 
+Out pressure_json(const Study& study) {
+  if (!study.has_grid) return nullptr;
+  Out levels = Out::array();
+  const PressureOrders orders = pressure_orders(study.pressure);
+  for (std::size_t k = 0; k < study.pressure.size(); ++k) {
+    const PressureLevel& level = study.pressure[k];
+    const auto order = [&](const std::vector<double>& of) {
+      return k > 0 ? number(of[k - 1]) : Out(nullptr);
+    };
+    levels.push_back({{"cells_across", level.edge},
+                      {"cells", level.cells},
+                      {"rms", number(level.rms)},
+                      {"largest", number(level.largest)},
+                      {"order_rms", order(orders.rms)},
+                      {"order_largest", order(orders.largest)},
+                      {"iterations", level.iterations},
+                      {"residual", number(level.residual)}});
+  }
+  return {{"expected_order", kPressureOrder}, {"residual", kPressureResidual}, {"levels", levels}};
+}
+
 Out answers_json(const Study& study) {
   const Answers answers = answer(study);
   const auto label = [&](const std::optional<std::size_t>& row) {
@@ -136,6 +158,21 @@ void read_reference(const Json& json, Study& study) {
   }
   const Json& single = json["float_error"];
   study.single = {single["substeps"], read_errors(single["errors"]), single["message"]};
+}
+
+// Levels solved to another residual, or of other grids, are measured anew.
+void read_pressure(const Json& json, Study& study) {
+  if (!study.has_grid || json.is_null() || json["residual"] != kPressureResidual) return;
+  for (const Json& level : json["levels"]) {
+    const auto value = [&](const char* key) {
+      return level[key].is_null() ? INFINITY : level[key].get<double>();
+    };
+    if (study.pressure.size() == std::size(kPressureEdges) ||
+        level["cells_across"] != kPressureEdges[study.pressure.size()])
+      return study.pressure.clear();
+    study.pressure.push_back({level["cells_across"], level["cells"], value("rms"), value("largest"),
+                              level["iterations"], value("residual")});
+  }
 }
 
 // A field of a CSV file: quoted where it has to be.
@@ -199,6 +236,7 @@ std::string to_json(const Study& study) {
              {"complete", study.complete},
              {"axes", Out::array()},
              {"reference", reference_json(study)},
+             {"pressure", pressure_json(study)},
              {"answers", answers_json(study)},
              {"rows", Out::array()}};
   for (const Axis& axis : study.axes) {
@@ -269,6 +307,7 @@ int take_over(const std::string& text, const std::string& file, Study& study) {
         if (mine.key == row.at("key")) read_row(row, ordered["rows"][k]["stages_ms"], mine), ++rows;
     }
     read_reference(json.at("reference"), study);
+    read_pressure(json.value("pressure", Json()), study);
     return rows;
   } catch (const nlohmann::json::exception& error) {
     throw Error(ErrorKind::kInput, file, std::string("is no study that can be gone on with: ") + error.what(),

@@ -14,9 +14,9 @@ std::string to_json(const Study& study);
 // every stage of any run, and what the run was. What was not measured is empty.
 std::string to_csv(const Study& study);
 
-// Of a study.json whose identity is the same: its rows, levels and float error, which are filled in. Rows by
-// their keys; those that `study` does not have are passed over. Returns how many there were. Throws
-// Error{kUsage} for another identity, with what differs, Error{kInput} for a file that is no study.
+// Of a study.json whose identity is the same: its rows, levels, float error and pressures, which are filled
+// in. Rows by their keys; those that `study` does not have are passed over. Returns how many there were.
+// Throws Error{kUsage} for another identity, with what differs, Error{kInput} for a file that is no study.
 int take_over(const std::string& json, const std::string& file, Study& study);
 
 // Substeps of the reference's levels whose caches a study.json's study may have left. Throws Error{kInput}

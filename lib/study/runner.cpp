@@ -1,23 +1,11 @@
 #include "study/runner.h"
 
-#include <tbb/global_control.h>
-
 #include "cache/writer.h"
 #include "pipeline/frame_times.h"
+#include "study/threads.h"
 
 namespace ringlet::study {
 namespace {
-
-// Holds the number of threads while it lives.
-class Threads {
- public:
-  explicit Threads(int threads) {
-    if (threads > 0) control_.emplace(tbb::global_control::max_allowed_parallelism, threads);
-  }
-
- private:
-  std::optional<tbb::global_control> control_;
-};
 
 Outcome run(pipeline::Simulation& simulation, const Common& common, state::FrameSink& sink,
             pipeline::RunControl control) {

@@ -46,6 +46,7 @@ class Running {
     const scene::Scene base = scene::load(options.base.file, {options.base.overrides});
     describe(base);
     int most = 1;
+    look_for_grids(base);
     for (const Variant& variant : variants_) {
       Row& row = study_.rows.emplace_back();
       row.label = variant.label, row.key = variant.key, row.axis = variant.axis;
@@ -62,6 +63,11 @@ class Running {
                          options.reference_cap};
     plan.overrides.insert(plan.overrides.end(), options.reference.begin(), options.reference.end());
     reference_.emplace(std::move(plan), study_.levels);
+    for (const std::string& setting : options.reference)
+      if (of_frames(setting.substr(0, setting.find('='))))
+        throw Error(ErrorKind::kUsage, "--reference " + setting,
+                    "frames of the same number would be of different times, which are not compared",
+                    "--set changes the times of all runs and the reference, --frames takes other frames");
     std::vector<std::string> overrides = options.base.overrides;
     overrides.insert(overrides.end(), options.reference.begin(), options.reference.end());
     scene::load(options.base.file, {overrides, "--reference"});
@@ -106,6 +112,15 @@ class Running {
                           .dump();
   }
 
+  void look_for_grids(const scene::Scene& base) {
+    const auto has_grid = [](const scene::Scene& scene) {
+      return scene.effects.hair_hair && scene.effects.hair_hair->grid;
+    };
+    study_.has_grid =
+        has_grid(base) || std::any_of(variants_.begin(), variants_.end(),
+                                      [&](const Variant& variant) { return has_grid(variant.scene); });
+  }
+
   void look_at_what_is_there() {
     const fs::path file = options_.directory / "study.json";
     if (!(options_.resume || options_.overwrite) || !fs::exists(file)) return;
@@ -142,7 +157,7 @@ class Running {
       if (study_.reference_converged || reference_->resolved() || !reference_->can_refine()) break;
       if (!refine()) return false;
     }
-    return measure_single();
+    return measure_single() && verify_pressure();
   }
 
   bool refine() {
@@ -226,6 +241,23 @@ class Running {
     } catch (const Error& error) {  // a scene that single precision is refused for
       if (error.kind() != ErrorKind::kInput && error.kind() != ErrorKind::kUsage) throw;
       study_.single.message = error.what();
+    }
+    return true;
+  }
+
+  // The grid's pressure solver on a problem whose solution is known, where a run has one.
+  bool verify_pressure() {
+    if (!study_.has_grid) return true;
+    std::vector<PressureLevel>& levels = study_.pressure;
+    while (levels.size() < std::size(kPressureEdges)) {
+      if (options_.common.stop && *options_.common.stop) return false;
+      levels.push_back(
+          pressure_level(kPressureEdges[levels.size()], kPressureResidual, options_.base.machine));
+      std::string line =
+          fmt::format("pressure: {} cells across, error {:.2e}", levels.back().edge, levels.back().rms);
+      if (levels.size() > 1) line += fmt::format(", order {:.2f}", pressure_orders(levels).rms.back());
+      tell(line);
+      save();
     }
     return true;
   }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "study/front.h"
+#include "study/pressure_order.h"
 #include "study/reference.h"
 
 namespace ringlet::study {
@@ -78,6 +79,8 @@ struct Study {
   bool reference_converged = false;  // the last change is under a tenth of the smallest error
   double resolution = 0;
   Single single;
+  bool has_grid = false;                // some run of it
+  std::vector<PressureLevel> pressure;  // of kPressureEdges, as far as it got; none without a grid
   bool measures_volume = false, measures_penetration = false, resampled = false;
 };
 

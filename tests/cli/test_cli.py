@@ -198,8 +198,8 @@ def test_an_absent_effect_has_no_stage_and_no_bytes(program, scene):
     whole, bare = plan(program, scene), plan(program, scene, "--set", "/effects/solids=null")
     assert [stage["name"] for stage in whole["stages"]] == ["roots", "strands", "solids"]
     assert [stage["name"] for stage in bare["stages"]] == ["roots", "strands"]
-    assert whole["absent"] == ["wind", "grid", "contacts", "grooming", "interpolation"]
-    assert bare["absent"] == ["wind", "grid", "contacts", "solids", "grooming", "interpolation"]
+    assert whole["absent"] == ["tries", "wind", "grid", "contacts", "grooming", "interpolation"]
+    assert bare["absent"] == ["tries", "wind", "grid", "contacts", "solids", "grooming", "interpolation"]
     assert all(stage["bytes"] > 0 and stage["launches"] == 4 * (LAST - 1) for stage in whole["stages"])
     assert bare["stages"] == whole["stages"][:2]
     assert (whole["strands"], whole["particles"]) == (STRANDS, STRANDS * PARTICLES)

@@ -14,6 +14,7 @@ OWN = ("kernels", "core", "scene", "groom", "solids", "state", "effects", "hairm
 
 # By room, the beginnings of the paths of ours that it may include besides its own.
 SCENE_STRUCTS = "scene/scene_desc.h"
+PRESSURE = ("kernels/launch/pressure.h", "kernels/grid/pressure_problem.h", "effects/host_threads.h", "effects/instruction_set.h")
 ALLOWED = {
     "kernels": (),
     "core": (),
@@ -25,7 +26,8 @@ ALLOWED = {
     "hairmesh": ("core/", "scene/", "groom/", "solids/", "state/", "kernels/"),
     "pipeline": ("core/", "scene/", "groom/", "solids/", "state/", "kernels/", "effects/", "hairmesh/"),
     "cache": ("core/", "state/"),
-    "study": ("core/", "scene/", "solids/", "state/", "pipeline/", "cache/"),
+    # The pressure's solver alone, which a study verifies, and the threads and instruction sets that it runs with.
+    "study": ("core/", "scene/", "solids/", "state/", "pipeline/", "cache/", *PRESSURE),
     # `info` and `groom` show and convert assets; nothing of the physics.
     "apps": ("core/", "scene/", "state/", "groom/", "solids/", "pipeline/", "cache/", "study/"),
 }

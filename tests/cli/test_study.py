@@ -8,6 +8,7 @@ import subprocess
 import time
 import xml.dom.minidom
 
+import numpy as np
 import pytest
 
 from conftest import run
@@ -128,6 +129,50 @@ def test_errors_are_what_compare_tells(program, scene, substeps, tmp_path):
     # compare counts the unstepped frame as well: two of three frames have an error.
     expected = result["overall"]["rms"] * (3 / 2) ** 0.5
     assert float(rows[1]["error_rms"]) == pytest.approx(expected, rel=1e-4)
+
+
+# ---- the grid's pressure
+
+GRID = '/effects/hair_hair={"grid":{"resolution":8}}'
+SHORT = ("--frames", "1-2", "--repeats", "1", "--reference-cap", "4", "--vary", "threads=1")
+
+
+def test_of_a_scene_with_a_grid_the_pressures_order_is_measured(program, scene, tmp_path):
+    """On ever finer grids, once; of a scene without one there is nothing of it."""
+    out = tmp_path / "study"
+    result = run(program, "study", scene, "-o", out, *SHORT, "--set", GRID)
+    assert result.returncode == 0, result.stderr
+    assert len(re.findall(r"^pressure: \d+ cells across, error", result.stdout, re.MULTILINE)) == 4
+    told = json.loads((out / "study.json").read_text())["pressure"]
+    levels = told["levels"]
+    assert told["expected_order"] == 2 and [level["cells_across"] for level in levels] == [16, 32, 64, 128]
+    assert all(level["residual"] <= told["residual"] <= 1e-10 and level["iterations"] > 0 for level in levels)
+    for kind in ("rms", "largest"):
+        errors = [level[kind] for level in levels]
+        orders = [level[f"order_{kind}"] for level in levels]
+        assert orders[0] is None and orders[1:] == pytest.approx(np.log2(np.divide(errors[:-1], errors[1:])), rel=1e-9)
+        assert orders[1:] == pytest.approx([2, 2, 2], abs=0.1)
+    page = (out / "report.md").read_text()
+    assert "## The grid's pressure\n" in page and "Theory gives **order 2**" in page
+    for level in levels[1:]:
+        row = f"| {level['cells_across']} | {level['cells']} | {level['rms']:.2e} | {level['order_rms']:.2f} "
+        assert f"{row}| {level['largest']:.2e} | {level['order_largest']:.2f} | {level['iterations']} |\n" in page
+
+    # What is there is kept, what is not is done.
+    again = run(program, "study", scene, "-o", out, "--resume", *SHORT, "--set", GRID)
+    assert again.returncode == 0 and "pressure:" not in again.stdout
+    cut = json.loads((out / "study.json").read_text())
+    assert cut["pressure"] == told
+    cut["pressure"]["levels"] = levels[:3]
+    (out / "study.json").write_text(json.dumps(cut))
+    again = run(program, "study", scene, "-o", out, "--resume", *SHORT, "--set", GRID)
+    assert re.findall(r"^pressure: (\d+) cells", again.stdout, re.MULTILINE) == ["128"]
+    assert json.loads((out / "study.json").read_text())["pressure"] == told
+
+
+def test_without_a_grid_there_is_no_pressure(substeps):
+    out, told, _ = substeps
+    assert told["pressure"] is None and "pressure" not in (out / "report.md").read_text()
 
 
 # ---- what can be varied
@@ -324,6 +369,8 @@ def test_bad_values_are_told_before_anything_runs(program, scene, tmp_path, vary
         ("--target=0", "--target: found `0`"),
         ("--frames=3-1", "--frames"),
         ("--reference=/model/x=1", "#/model/x: found an unknown key"),
+        ("--reference=/frames/fps=48", "--reference /frames/fps=48: frames of the same number would be of different times"),
+        ('--reference=/frames={"last":9}', "of different times, which are not compared (--set changes the times of all runs"),
         ("--frames=1-1", "no frame of these is stepped"),
     ],
 )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from conftest import SOURCE, run
-from tiny import LENGTH, data_bytes, figures, steps, strands, write_scene
+from tiny import LENGTH, PARTICLES, data_bytes, figures, steps, strands, write_scene
 from tiny_mesh import write_mesh_scene
 
 LAST = 5
@@ -192,6 +192,9 @@ def test_the_plan_tells_from_how_many_to_how_many(program, tmp_path):
     frames = LAST - 1
     # 1 and 2 substeps at the least; 1, 2, 4 and 8 at the most.
     assert (stages["strands"]["least_launches"], stages["strands"]["launches"]) == (3 * frames, 17 * frames)
+    # The frame's start, and the positions of two tries in double precision: three arrays of [32 lanes][particles][3] at the least.
+    assert stages["tries"]["bytes"] > 32 * PARTICLES * 3 * (4 + 4 + 2 * 8) and stages["tries"]["launches"] == 0
+    assert "tries" in json.loads(run(program, "plan", scene, "--json", fixed(8)).stdout)["absent"]
     assert "of 2 to 8 substeps" in run(program, "plan", scene, chosen(1e-3, most=8)).stdout
     steps(program, scene, tmp_path / "out", chosen(1e-3, most=8), "-q")
     tried = figures(tmp_path / "out", "substeps_tried").sum()

@@ -90,6 +90,39 @@ def test_guides_and_hair_meshes_show_too(program, tmp_path):
     expect_planned(traced(program, mesh, tmp_path), plan(program, mesh))
 
 
+ELLIPSOID = [{"centre": [9, 0, 0], "radii": [0.1, 0.1, 0.1]}]
+
+
+# By options: launches of a frame's three substeps in solids, of a frame in minimisation, of a stored frame in strands.
+@pytest.mark.parametrize("options, solids, minimisation, placed", [
+    ([], 3, 1, 1),
+    ([f"--set=/model/hair_mesh/ellipsoids={json.dumps(ELLIPSOID)}"], 6, 1, 1),
+    (["--set=/model/hair_mesh/deformation_minimisation=false", '--set=/cache/fields=["position","velocity"]'], 3, None, 2),
+    (["--set=/effects/solids=null", "--set=/frames/preroll=2"], None, None, 1),
+])
+def test_a_hair_meshs_launches_are_shown_and_those_of_the_plan(program, tmp_path, options, solids, minimisation, placed):
+    mesh = write_mesh_scene(tmp_path, lambda scene: scene["effects"].update(wind=dict(velocity=[1, 0, 0])))
+    options = ["--set=/model/substeps=3", *options]
+    planned = plan(program, mesh, *options)
+    expect_planned(traced(program, mesh, tmp_path, *options), planned)
+    frames = planned["frames"]
+    expected = {name: 3 * frames for name in ("roots", "wind", "forces", "solve")} | {"strands": placed * LAST}
+    expected |= {"solids": solids * frames} if solids else {}
+    expected |= {"minimisation": minimisation * frames} if minimisation else {}
+    assert {stage["name"]: stage["launches"] for stage in planned["stages"]} == expected
+    assert all(stage["least_launches"] == stage["launches"] for stage in planned["stages"])
+
+
+def test_a_hair_meshs_tries_are_within_the_plan(program, tmp_path):
+    mesh = write_mesh_scene(tmp_path)
+    options = ['--set=/model/substeps={"tolerance": 1e-3, "max": 8}']
+    named = traced(program, mesh, tmp_path, *options)
+    expect_planned(named, plan(program, mesh, *options))
+    tried = figures(tmp_path / "out", "substeps_tried").sum()
+    assert sum(event["args"]["launches"] for event in named["solve"]) == tried
+    assert sum(event["args"]["launches"] for event in named["minimisation"]) == len(named["try"])
+
+
 def test_tries_of_a_frame_are_shown_and_within_the_plan(program, scene, tmp_path):
     options = ['--set=/model/substeps={"tolerance": 1e-3, "max": 16}']
     named = traced(program, scene, tmp_path, *options)

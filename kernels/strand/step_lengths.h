@@ -53,7 +53,7 @@ struct TensionedChain {
 
 // What lengths are off by, 0 where nothing holds or can move a segment.
 template <int kSpan, class Arrays, class R>
-RINGLET_FUNCTION void begin_tensions(const TensionedChain<kSpan, Arrays, R>& c) {
+RINGLET_OUTLINED void begin_tensions(const TensionedChain<kSpan, Arrays, R>& c) {
   const ProjectedStrand<R>& s = c.lengths;
   Vector3<R> here = load3<R>(s.position, s.stride);
   for (int k = 0; k < c.segments(); ++k) {
@@ -87,7 +87,7 @@ RINGLET_KERNEL R precondition_tensions(const TensionedChain<kSpan, Arrays, R>& c
 // The next search direction p, image + carried p; what its tensions displace, A^-1 J^T p, and how they
 // shorten segments by that, S p, into the images. Returns p S p.
 template <int kSpan, class Arrays, class R>
-RINGLET_FUNCTION R respond_to_tensions(const TensionedChain<kSpan, Arrays, R>& c, R carried, bool first) {
+RINGLET_OUTLINED R respond_to_tensions(const TensionedChain<kSpan, Arrays, R>& c, R carried, bool first) {
   const int stride = c.stride();
   Vector3<R> after[kBand] = {zero3<R>(), zero3<R>(), zero3<R>()}, pull_before = zero3<R>();
   for (int node = 0; node < c.count; ++node) {
@@ -126,7 +126,7 @@ RINGLET_FUNCTION R respond_to_tensions(const TensionedChain<kSpan, Arrays, R>& c
 
 // Moves the nodes of the `active` lanes `along` the displacement.
 template <int kSpan, class Arrays, class R>
-RINGLET_FUNCTION void follow_tensions(const TensionedChain<kSpan, Arrays, R>& c, R along, Mask<R> active) {
+RINGLET_OUTLINED void follow_tensions(const TensionedChain<kSpan, Arrays, R>& c, R along, Mask<R> active) {
   for (int node = c.clamped; node < c.count; ++node) {
     const Vector3<R> moved = select(active, along * load3<R>(c.moved(node), c.stride()), zero3<R>());
     c.nodes.put(node, c.nodes.position_at(node) + moved,

@@ -152,6 +152,28 @@ void Measure::add_distances(const std::vector<float>& run, const std::vector<flo
           (point(run, static_cast<std::int64_t>(i)) - point(reference, static_cast<std::int64_t>(i))).norm());
 }
 
+void Measure::add_to_strands(const std::vector<float>& run, const std::vector<float>& reference) {
+  const auto& offsets = reference_.header().offsets;
+  squares_.resize(pairs_.size(), 0.0), ++frames_;
+  tbb::parallel_for(std::size_t{0}, pairs_.size(), [&](std::size_t k) {
+    const std::size_t strand = pairs_[k].reference;
+    double squares = 0;
+    for (std::int64_t i = offsets[strand]; i < offsets[strand + 1]; ++i)
+      squares += (point(run, i) - point(reference, i)).squaredNorm();
+    squares_[k] += squares / static_cast<double>(offsets[strand + 1] - offsets[strand]);
+  });
+}
+
+std::optional<double> Measure::typical() const {
+  if (squares_.empty()) return std::nullopt;
+  std::vector<double> squares = squares_;
+  for (double& value : squares)
+    if (std::isnan(value)) value = std::numeric_limits<double>::infinity();
+  const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
+  std::nth_element(squares.begin(), middle, squares.end());
+  return std::sqrt(*middle / static_cast<double>(frames_));
+}
+
 void Measure::add_lengths(const state::Frame& run, const state::Frame& reference) {
   const state::RunHeader& header = reference_.header();
   std::vector<double> difference(pairs_.size(), 0.0);
@@ -186,6 +208,7 @@ void Measure::write(state::Frame frame, state::Snapshot, double) {
   if (!pairs_.empty()) {
     const std::vector<float> placed = at_reference(frame.position);
     add_distances(placed, reference.position, position_);
+    add_to_strands(placed, reference.position);
     add_distances(at_reference(frame.velocity), reference.velocity, velocity_);
     add_lengths(frame, reference);
     add_volume(frame, reference, placed);
@@ -195,7 +218,8 @@ void Measure::write(state::Frame frame, state::Snapshot, double) {
 
 Errors Measure::errors() const {
   return {position_.spread(), velocity_.spread(), length_.spread(),
-          volume_.spread(),   depth_.spread(),    static_cast<std::int64_t>(pairs_.size())};
+          volume_.spread(),   depth_.spread(),    static_cast<std::int64_t>(pairs_.size()),
+          typical()};
 }
 
 Errors measure_cache(const scene::Scene& scene, const cache::CacheReader& reference,

@@ -37,6 +37,8 @@ class Measure : public state::FrameSink {
   void place(const Pair& pair);
   std::vector<float> at_reference(const std::vector<float>& values) const;
   void add_distances(const std::vector<float>& run, const std::vector<float>& reference, SpreadOf& to) const;
+  void add_to_strands(const std::vector<float>& run, const std::vector<float>& reference);
+  std::optional<double> typical() const;
   void add_lengths(const state::Frame& run, const state::Frame& reference);
   void add_volume(const state::Frame& run, const state::Frame& reference, const std::vector<float>& placed);
 
@@ -46,6 +48,8 @@ class Measure : public state::FrameSink {
   std::vector<Pair> pairs_;
   std::vector<std::int64_t> from_;  // [reference's particles] the run's particle before it; -1: not compared
   std::vector<float> share_;        // [reference's particles] how far on to the next
+  std::vector<double> squares_;     // [pairs] of distances, over particles and frames
+  std::int64_t frames_ = 0;         // of these
   bool resampled_ = false;
   double cell_ = 0;  // [scene units] of the cubes that hair's volume is counted in; 0: not measured
   double extent_ = 0;

@@ -20,10 +20,17 @@ Out spread(const std::optional<Spread>& spread) {
   return {{"rms", number(spread->rms)}, {"p99", number(spread->p99)}};
 }
 
+Out optional_number(const std::optional<double>& value) { return value ? number(*value) : Out(nullptr); }
+
 Out errors(const Errors& errors) {
   Out out = {{"strands", errors.strands}};
   for (const auto& [name, value] : errors.named()) out[name] = spread(value);
+  out["median_strand"] = optional_number(errors.typical);
   return out;
+}
+
+std::optional<double> read_number(const Json& json) {
+  return json.is_null() ? std::nullopt : std::optional(json.get<double>());
 }
 
 std::optional<Spread> read_spread(const Json& json) {
@@ -35,8 +42,9 @@ std::optional<Spread> read_spread(const Json& json) {
 }
 
 Errors read_errors(const Json& json) {
-  return {read_spread(json["error"]),  read_spread(json["velocity"]),    read_spread(json["length"]),
-          read_spread(json["volume"]), read_spread(json["penetration"]), json["strands"]};
+  return {read_spread(json["error"]),        read_spread(json["velocity"]),    read_spread(json["length"]),
+          read_spread(json["volume"]),       read_spread(json["penetration"]), json["strands"],
+          read_number(json["median_strand"])};
 }
 
 Out row_json(const Study& study, const Row& row) {
@@ -70,7 +78,9 @@ Out reference_json(const Study& study) {
     levels.push_back({{"substeps", level.substeps},
                       {"diverged", level.diverged},
                       {"change", spread(level.change)},
-                      {"order", level.order ? number(*level.order) : Out(nullptr)}});
+                      {"order", optional_number(level.order)},
+                      {"change_of_median_strand", optional_number(level.typical)},
+                      {"order_of_median_strand", optional_number(level.typical_order)}});
   return {{"precision", "double"},
           {"substeps", study.reference_substeps},
           {"cap", study.reference_cap},
@@ -123,6 +133,8 @@ Out answers_json(const Study& study) {
   for (const Order& order : orders_of(study)) {
     Out found = {{"axis", study.axes[order.axis].name}, {"values", order.values}, {"orders", Out::array()}};
     for (const double value : order.orders) found["orders"].push_back(number(value));
+    found["orders_of_median_strand"] = Out::array();
+    for (const double value : order.typical) found["orders_of_median_strand"].push_back(number(value));
     out["orders"].push_back(found);
   }
   if (!study.wanted.budget && !study.wanted.target) return out;
@@ -152,9 +164,9 @@ void read_row(const Json& json, const Out& stages, Row& row) {
 void read_reference(const Json& json, Study& study) {
   study.levels.clear();
   for (const Json& level : json["levels"]) {
-    Level read{level["substeps"], level["diverged"], read_spread(level["change"]), std::nullopt};
-    if (!level["order"].is_null()) read.order = level["order"].get<double>();
-    study.levels.push_back(read);
+    study.levels.push_back({level["substeps"], level["diverged"], read_spread(level["change"]),
+                            read_number(level["order"]), read_number(level["change_of_median_strand"]),
+                            read_number(level["order_of_median_strand"])});
   }
   const Json& single = json["float_error"];
   study.single = {single["substeps"], read_errors(single["errors"]), single["message"]};
@@ -258,6 +270,7 @@ std::string to_csv(const Study& study) {
   for (const Axis& axis : study.axes) add(field(axis.name));
   add("ms_per_frame");
   for (const auto& [name, value] : Errors{}.named()) add(name + "_rms"), add(name + "_p99");
+  add("error_median_strand");
   for (const std::string& stage : stages) add("ms_" + stage);
   for (const char* name : {"strands", "particles", "strands_compared"}) add(name);
   // Those that are varied have their columns already.
@@ -278,6 +291,7 @@ std::string to_csv(const Study& study) {
       add(field(value ? std::optional<double>(value->rms) : std::nullopt));
       add(field(value ? std::optional<double>(value->p99) : std::nullopt));
     }
+    add(field(row.measured.errors.typical));
     for (const std::string& stage : stages) {
       std::optional<double> spent;
       if (row.timed)

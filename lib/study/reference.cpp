@@ -73,15 +73,20 @@ fs::path Reference::cache() const { return directory_of(substeps()); }
 void Reference::compare(Level& level, int before) {
   const cache::CacheReader old(directory_of(before)), now(directory_of(level.substeps));
   double extent = 0;
-  level.change = measure_cache(scene(level.substeps), now, old, &extent).position;
+  const Errors change = measure_cache(scene(level.substeps), now, old, &extent);
+  level.change = change.position, level.typical = change.typical;
   resolution_ = extent * 0x1p-24;
   const Level& last = levels_.back();
-  if (last.change && last.substeps == before && last.change->rms > 0 && level.change->rms > 0)
-    level.order = std::log2(last.change->rms / level.change->rms);
+  if (!last.change || last.substeps != before) return;
+  const auto order = [](double coarse, double fine) {
+    return coarse > 0 && fine > 0 ? std::optional(std::log2(coarse / fine)) : std::nullopt;
+  };
+  level.order = order(last.change->rms, level.change->rms);
+  if (last.typical && level.typical) level.typical_order = order(*last.typical, *level.typical);
 }
 
 Ending Reference::refine(const Common& common) {
-  Level level{next(), false, {}, {}};
+  Level level{next(), false, {}, {}, {}, {}};
   Machine machine = plan_.machine;
   machine.options.precision = pipeline::Precision::kDouble;
   machine.options.backend = pipeline::Backend::kCpu;

@@ -179,28 +179,38 @@ class Page {
     if (orders.empty()) say("No setting was given two values that are numbers.");
     for (const Order& order : orders) {
       std::string steps, at;
+      const auto text = [](double value) {
+        return std::isfinite(value) ? fmt::format("{:.2f}", value) : std::string("-");
+      };
       for (std::size_t k = 0; k < order.orders.size(); ++k)
-        steps += fmt::format("{}{} to {}: {}", k ? ", " : "", order.values[k], order.values[k + 1],
-                             std::isfinite(order.orders[k]) ? fmt::format("{:.2f}", order.orders[k]) : "-");
+        steps += fmt::format("{}{} to {}: {} ({})", k ? ", " : "", order.values[k], order.values[k + 1],
+                             text(order.orders[k]), text(order.typical[k]));
       for (std::size_t a = 0; a < study_.axes.size() && study_.product; ++a)
         if (a != order.axis)
           at += fmt::format("{} {}={}", at.empty() ? " with" : ",", study_.names[a],
                             row(order.rows[0]).columns[a]);
       say("- {}{}: {}.", code(study_.axes[order.axis].name), at, steps);
     }
-    say("\nExpected of the step in the substeps: order 1, and less where lengths are held, solids touch or "
-        "hair meets hair. Errors that something else holds up, and such as grow with a value, show as 0 or "
-        "less.\n");
+    say("\nOf the RMS error, and in brackets of the median strand's, which few strands that part with every "
+        "step "
+        "size do not show. Expected of the step in the substeps: order 1 once these resolve the motion; "
+        "where "
+        "lengths are held by masses alone, solids touch or hair meets hair it may fall below. Errors that "
+        "something else holds up, and such as grow with a value, show as 0 or less.\n");
     say("## The reference\n");
     say("The scene as given{} in double precision, {} substeps a frame. Its substeps were doubled, at most "
         "to {}:\n",
         study_.reference_overrides.empty() ? "" : " with " + joined(study_.reference_overrides),
         study_.reference_substeps, study_.reference_cap);
-    say("| substeps | change of positions from the level before, RMS [{}] | order |", unit());
-    say("| --- | --- | --- |");
+    say("| substeps | change of positions from the level before, RMS [{}] | order | of the median strand "
+        "[{}] | "
+        "order |",
+        unit(), unit());
+    say("| --- | --- | --- | --- | --- |");
     for (const Level& level : study_.levels)
-      say("| {} | {} | {} |", level.substeps, level.diverged ? "diverged" : cell(rms(level.change), "{:.2e}"),
-          cell(level.order, "{:.2f}"));
+      say("| {} | {} | {} | {} | {} |", level.substeps,
+          level.diverged ? "diverged" : cell(rms(level.change), "{:.2e}"), cell(level.order, "{:.2f}"),
+          cell(level.typical, "{:.2e}"), cell(level.typical_order, "{:.2f}"));
     say("\n{}\n", verdict());
   }
 

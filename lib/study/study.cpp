@@ -38,6 +38,17 @@ std::vector<Point> points_of(const Study& study) {
   return points;
 }
 
+// What only says how well a step is solved is not to hold up the reference.
+std::vector<std::string> precise_settings(const scene::Scene& base) {
+  constexpr double kLengthTolerance = 1e-6;
+  const auto& lengths = base.effects.inextensible;
+  if (!lengths) return {};
+  std::vector<std::string> settings = {"/effects/inextensible/metric=\"step\""};
+  if (lengths->tolerance > kLengthTolerance)
+    settings.push_back(fmt::format("/effects/inextensible/tolerance={}", kLengthTolerance));
+  return settings;
+}
+
 // The study as it goes on: rows, reference, files.
 class Running {
  public:
@@ -61,7 +72,8 @@ class Running {
                          options.directory / "reference",
                          most,
                          options.reference_cap};
-    plan.overrides.insert(plan.overrides.end(), options.reference.begin(), options.reference.end());
+    const std::vector<std::string>& settings = study_.reference_overrides;
+    plan.overrides.insert(plan.overrides.end(), settings.begin(), settings.end());
     reference_.emplace(std::move(plan), study_.levels);
     for (const std::string& setting : options.reference)
       if (of_frames(setting.substr(0, setting.find('='))))
@@ -69,7 +81,7 @@ class Running {
                     "frames of the same number would be of different times, which are not compared",
                     "--set changes the times of all runs and the reference, --frames takes other frames");
     std::vector<std::string> overrides = options.base.overrides;
-    overrides.insert(overrides.end(), options.reference.begin(), options.reference.end());
+    overrides.insert(overrides.end(), settings.begin(), settings.end());
     scene::load(options.base.file, {overrides, "--reference"});
     for (std::size_t k = 0; k < variants_.size(); ++k)
       if (study_.rows[k].status == Status::kNew) rehearse(variants_[k]);
@@ -97,7 +109,9 @@ class Running {
     study_.product = options_.product;
     study_.wanted = options_.wanted;
     study_.axes = options_.axes, study_.names = short_names(options_.axes);
-    study_.reference_overrides = options_.reference;
+    study_.reference_overrides = precise_settings(base);
+    study_.reference_overrides.insert(study_.reference_overrides.end(), options_.reference.begin(),
+                                      options_.reference.end());
     study_.reference_cap = options_.reference_cap;
     study_.measures_penetration = !base.effects.solids.empty();
     study_.measures_volume = base.model.type == scene::ModelType::kHairMesh ||
@@ -105,7 +119,7 @@ class Running {
     study_.identity = Json({{"program_version", RINGLET_VERSION},
                             {"scene_hash", base.hash},
                             {"frames", {study_.frames.first, study_.frames.last}},
-                            {"reference", options_.reference},
+                            {"reference", study_.reference_overrides},
                             {"processor", study_.processor},
                             {"threads", machine_value("threads", options_.base.machine)},
                             {"instruction_set", machine_value("instruction-set", options_.base.machine)}})
@@ -322,7 +336,7 @@ std::vector<Order> orders_of(const Study& study) {
   for (std::size_t a = 0; a < study.axes.size(); ++a) {
     std::vector<bool> done(study.rows.size(), false);
     for (std::size_t first = 0; first < study.rows.size(); ++first) {
-      Order order{a, {}, {}, {}};
+      Order order{a, {}, {}, {}, {}};
       for (std::size_t k = first; k < study.rows.size(); ++k) {
         const Row& row = study.rows[k];
         bool same =
@@ -336,12 +350,13 @@ std::vector<Order> orders_of(const Study& study) {
       std::sort(order.rows.begin(), order.rows.end(), [&](std::size_t x, std::size_t y) {
         return *numeric(study.rows[x].columns[a]) < *numeric(study.rows[y].columns[a]);
       });
-      std::vector<double> errors;
+      std::vector<double> errors, typical;
       for (const std::size_t k : order.rows) {
         order.values.push_back(*numeric(study.rows[k].columns[a]));
         errors.push_back(study.rows[k].measured.errors.position->rms);
+        typical.push_back(study.rows[k].measured.errors.typical.value_or(0));
       }
-      order.orders = orders(order.values, errors);
+      order.orders = orders(order.values, errors), order.typical = orders(order.values, typical);
       found.push_back(std::move(order));
     }
   }

@@ -131,6 +131,20 @@ def test_errors_are_what_compare_tells(program, scene, substeps, tmp_path):
     assert float(rows[1]["error_rms"]) == pytest.approx(expected, rel=1e-4)
 
 
+def test_stiff_strands_whose_lengths_are_held_converge_in_the_metric_of_the_step(program, tmp_path):
+    """Whose reference always has it, and whose strands are otherwise those of any scene."""
+
+    def change(scene):
+        del scene["effects"]["solids"]
+        scene["model"] = {"substeps": 16}
+
+    scene = write_scene(tmp_path, change, FEW)
+    told, _ = study(program, scene, tmp_path / "study", *QUICK, "--vary", "/effects/inextensible/metric=step")
+    assert told["reference"]["set"] == ['/effects/inextensible/metric="step"', "/effects/inextensible/tolerance=1e-06"]
+    orders = [level["order_of_median_strand"] for level in told["reference"]["levels"]]
+    assert orders[:2] == [None, None] and orders[2:] == pytest.approx([1] * len(orders[2:]), abs=0.1)
+
+
 # ---- the grid's pressure
 
 GRID = '/effects/hair_hair={"grid":{"resolution":8}}'

@@ -20,7 +20,8 @@ class ContactsStage : public testing::Test {
   ContactsStage() {
     scene_.model.substeps = 8, scene_.model.clamped_particles = 1;
     scene_.limits = {10, 1000};
-    scene_.effects.inextensible = scene::Inextensible{1e-4, 8, scene::Cadence::kSubstep};
+    scene_.effects.inextensible =
+        scene::Inextensible{1e-4, 8, scene::LengthMetric::kMass, scene::Cadence::kSubstep};
     scene_.effects.hair_hair.emplace();
     scene_.effects.hair_hair->contacts = scene::HairContacts{0.3, 4, scene::Cadence::kFrame, std::nullopt};
     state::StrandInput input;

@@ -67,7 +67,7 @@ TEST(Radius, IsThatOfEveryParticleAndTakesNothingWhereNothingAsks) {
 
 TEST(Lengths, AreHeldWithTheScenesToleranceAndTold) {
   Hair run;
-  run.scene.effects.inextensible = {1e-6, 8, scene::Cadence::kSubstep};
+  run.scene.effects.inextensible = {1e-6, 8, scene::LengthMetric::kMass, scene::Cadence::kSubstep};
   run.position(3, 2, 0) += 0.002;
   run.velocity(5, 1, 1) = 7;
   Lengths<double> lengths(run.scene, run.model, run.state);
@@ -85,7 +85,8 @@ TEST(Lengths, AreHeldWithTheScenesToleranceAndTold) {
 TEST(Lengths, AreLeftAloneWhereTheSceneDoesNotHoldThemNow) {
   for (const bool at_frame_end : {false, true}) {
     Hair run;
-    if (at_frame_end) run.scene.effects.inextensible = {1e-6, 8, scene::Cadence::kFrame};
+    if (at_frame_end)
+      run.scene.effects.inextensible = {1e-6, 8, scene::LengthMetric::kMass, scene::Cadence::kFrame};
     run.position(3, 2, 0) += 0.002;
     const auto before = run.state.position;
     Lengths<double> lengths(run.scene, run.model, run.state);
@@ -99,7 +100,7 @@ TEST(Lengths, AreLeftAloneWhereTheSceneDoesNotHoldThemNow) {
 
 TEST(Lengths, NameTheFirstStrandThatDiverged) {
   Hair run;
-  run.scene.effects.inextensible = {1e-4, 8, scene::Cadence::kSubstep};
+  run.scene.effects.inextensible = {1e-4, 8, scene::LengthMetric::kMass, scene::Cadence::kSubstep};
   Lengths<double> lengths(run.scene, run.model, run.state);
   run.velocity(21, 1, 1) = 51, run.position(30, 1, 2) = std::nan("");
   lengths.hold(*run.executor, kMiddle, 0.04, run.report);

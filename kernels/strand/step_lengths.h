@@ -5,13 +5,13 @@
 //
 // with J, C as in length_projection.h. Weighed by masses alone (A = 1) the same correction strains bends and
 // twists whose springs are stiffer than a step resolves, and material damping lets go of that only over beta,
-// however short the step: such steps converge, but to another motion. What is left here, of second order in
-// the lengths or in the solve, is for the projection by masses.
+// however short the step: such steps converge, but to another motion. What is left here is for the projection
+// by masses: as much of that as there is of the tensions.
 //
 // Conjugate gradients on the tensions, each iteration one substitution in the factor that the step has left.
 // They are preconditioned by the sum of two stiffnesses: of the masses alone (tridiagonal, eliminated
-// already) and of the segments' own springs, (h^2 + h beta) kappa. Either is what there is where it is the
-// greater one.
+// already) and of the segments' own springs, (h^2 + h beta) kappa. Springs that span more than a segment are
+// not in it: where these are much stiffer than the segments' own, most is left to the masses.
 #pragma once
 #include "kernels/strand/band_solver.h"
 #include "kernels/strand/length_projection.h"
@@ -22,7 +22,8 @@ inline namespace RINGLET_ISA {
 // Of one correction.
 inline constexpr int kTensionIterations = 2;
 
-// Corrections before what is still off is left to the masses: each leaves a tenth of the tension's error.
+// Before what is still off is left to the masses. With springs that are all alike either of them leaves a
+// tenth to a fifth of the tensions' error.
 inline constexpr int kStepCorrections = 2;
 
 // Scratch of a segment: the projection's; residual, search direction and the image of either.

@@ -302,8 +302,7 @@ RINGLET_KERNEL SubstepResult<R> hold_step_lengths(const StrandPack<R>& s,
     open = open & (strain > tolerance);
   }
   if (any(open)) {
-    const ProjectionResult<R> rest =
-        project_lengths(lengths, tolerance, p.length_iterations - corrections, open);
+    const ProjectionResult<R> rest = project_lengths(lengths, tolerance, p.length_iterations, open);
     strain = rest.strain, iterations = iterations + rest.iterations;
   }
   const Mask<R> late = open & (strain > tolerance);

@@ -36,8 +36,9 @@ struct Errors {
   std::optional<Spread> volume;       // of frames, the hair's volume over the reference's, less one [-]
   std::optional<Spread> penetration;  // depth of particles in solids: the run's own [scene units]
   std::int64_t strands = 0;           // compared
-  std::optional<double> typical;  // median over strands of the RMS over a strand's particles and frames: few
-                                  // strands that part with every step size do not show [scene units]
+  std::optional<double>
+      median_strand;  // median over strands of the RMS over a strand's particles and frames: few
+                      // strands that part with every step size do not show [scene units]
 
   // By their names in study.json and, with `_rms` and `_p99`, in study.csv.
   std::vector<std::pair<std::string, std::optional<Spread>>> named() const {

@@ -164,7 +164,7 @@ void Measure::add_to_strands(const std::vector<float>& run, const std::vector<fl
   });
 }
 
-std::optional<double> Measure::typical() const {
+std::optional<double> Measure::median_strand() const {
   if (squares_.empty()) return std::nullopt;
   std::vector<double> squares = squares_;
   for (double& value : squares)
@@ -219,7 +219,7 @@ void Measure::write(state::Frame frame, state::Snapshot, double) {
 Errors Measure::errors() const {
   return {position_.spread(), velocity_.spread(), length_.spread(),
           volume_.spread(),   depth_.spread(),    static_cast<std::int64_t>(pairs_.size()),
-          typical()};
+          median_strand()};
 }
 
 Errors measure_cache(const scene::Scene& scene, const cache::CacheReader& reference,

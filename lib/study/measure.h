@@ -38,7 +38,7 @@ class Measure : public state::FrameSink {
   std::vector<float> at_reference(const std::vector<float>& values) const;
   void add_distances(const std::vector<float>& run, const std::vector<float>& reference, SpreadOf& to) const;
   void add_to_strands(const std::vector<float>& run, const std::vector<float>& reference);
-  std::optional<double> typical() const;
+  std::optional<double> median_strand() const;
   void add_lengths(const state::Frame& run, const state::Frame& reference);
   void add_volume(const state::Frame& run, const state::Frame& reference, const std::vector<float>& placed);
 

@@ -11,7 +11,7 @@ namespace ringlet::study {
 // The order that theory gives for the seven-point operator, in the width of a cell.
 inline constexpr int kPressureOrder = 2;
 // Cells along the radius of the ball that manufactured_pressure.h describes.
-inline constexpr int kPressureEdges[] = {16, 32, 64, 128};
+inline constexpr int kPressureEdges[] = {8, 16, 32, 64};
 // The relative residual to solve to: under it what the solve leaves is no part of the error.
 inline constexpr double kPressureResidual = 1e-10;
 

@@ -25,7 +25,7 @@ Out optional_number(const std::optional<double>& value) { return value ? number(
 Out errors(const Errors& errors) {
   Out out = {{"strands", errors.strands}};
   for (const auto& [name, value] : errors.named()) out[name] = spread(value);
-  out["median_strand"] = optional_number(errors.typical);
+  out["median_strand"] = optional_number(errors.median_strand);
   return out;
 }
 
@@ -42,9 +42,9 @@ std::optional<Spread> read_spread(const Json& json) {
 }
 
 Errors read_errors(const Json& json) {
-  return {read_spread(json["error"]),        read_spread(json["velocity"]),    read_spread(json["length"]),
-          read_spread(json["volume"]),       read_spread(json["penetration"]), json["strands"],
-          read_number(json["median_strand"])};
+  return {read_spread(json["error"]),           read_spread(json["velocity"]),    read_spread(json["length"]),
+          read_spread(json["volume"]),          read_spread(json["penetration"]), json["strands"],
+          read_number(json.at("median_strand"))};
 }
 
 Out row_json(const Study& study, const Row& row) {
@@ -79,8 +79,8 @@ Out reference_json(const Study& study) {
                       {"diverged", level.diverged},
                       {"change", spread(level.change)},
                       {"order", optional_number(level.order)},
-                      {"change_of_median_strand", optional_number(level.typical)},
-                      {"order_of_median_strand", optional_number(level.typical_order)}});
+                      {"change_of_median_strand", optional_number(level.median_strand)},
+                      {"order_of_median_strand", optional_number(level.median_strand_order)}});
   return {{"precision", "double"},
           {"substeps", study.reference_substeps},
           {"cap", study.reference_cap},
@@ -134,7 +134,7 @@ Out answers_json(const Study& study) {
     Out found = {{"axis", study.axes[order.axis].name}, {"values", order.values}, {"orders", Out::array()}};
     for (const double value : order.orders) found["orders"].push_back(number(value));
     found["orders_of_median_strand"] = Out::array();
-    for (const double value : order.typical) found["orders_of_median_strand"].push_back(number(value));
+    for (const double value : order.median_strand) found["orders_of_median_strand"].push_back(number(value));
     out["orders"].push_back(found);
   }
   if (!study.wanted.budget && !study.wanted.target) return out;
@@ -165,8 +165,8 @@ void read_reference(const Json& json, Study& study) {
   study.levels.clear();
   for (const Json& level : json["levels"]) {
     study.levels.push_back({level["substeps"], level["diverged"], read_spread(level["change"]),
-                            read_number(level["order"]), read_number(level["change_of_median_strand"]),
-                            read_number(level["order_of_median_strand"])});
+                            read_number(level["order"]), read_number(level.at("change_of_median_strand")),
+                            read_number(level.at("order_of_median_strand"))});
   }
   const Json& single = json["float_error"];
   study.single = {single["substeps"], read_errors(single["errors"]), single["message"]};
@@ -291,7 +291,7 @@ std::string to_csv(const Study& study) {
       add(field(value ? std::optional<double>(value->rms) : std::nullopt));
       add(field(value ? std::optional<double>(value->p99) : std::nullopt));
     }
-    add(field(row.measured.errors.typical));
+    add(field(row.measured.errors.median_strand));
     for (const std::string& stage : stages) {
       std::optional<double> spent;
       if (row.timed)

@@ -74,7 +74,7 @@ void Reference::compare(Level& level, int before) {
   const cache::CacheReader old(directory_of(before)), now(directory_of(level.substeps));
   double extent = 0;
   const Errors change = measure_cache(scene(level.substeps), now, old, &extent);
-  level.change = change.position, level.typical = change.typical;
+  level.change = change.position, level.median_strand = change.median_strand;
   resolution_ = extent * 0x1p-24;
   const Level& last = levels_.back();
   if (!last.change || last.substeps != before) return;
@@ -82,7 +82,8 @@ void Reference::compare(Level& level, int before) {
     return coarse > 0 && fine > 0 ? std::optional(std::log2(coarse / fine)) : std::nullopt;
   };
   level.order = order(last.change->rms, level.change->rms);
-  if (last.typical && level.typical) level.typical_order = order(*last.typical, *level.typical);
+  if (last.median_strand && level.median_strand)
+    level.median_strand_order = order(*last.median_strand, *level.median_strand);
 }
 
 Ending Reference::refine(const Common& common) {

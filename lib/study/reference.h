@@ -15,7 +15,7 @@ struct Level {
   bool diverged = false;
   std::optional<Spread> change;  // of positions from the level before [scene units]; nothing: it is the first
   std::optional<double> order;   // by which the change fell from that of the level before
-  std::optional<double> typical, typical_order;  // the same of the median strand
+  std::optional<double> median_strand, median_strand_order;  // the same of the median strand
 };
 
 // The substeps that the reference is to reach from the start, in doublings: sixteen times those of the finest

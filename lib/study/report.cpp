@@ -184,7 +184,7 @@ class Page {
       };
       for (std::size_t k = 0; k < order.orders.size(); ++k)
         steps += fmt::format("{}{} to {}: {} ({})", k ? ", " : "", order.values[k], order.values[k + 1],
-                             text(order.orders[k]), text(order.typical[k]));
+                             text(order.orders[k]), text(order.median_strand[k]));
       for (std::size_t a = 0; a < study_.axes.size() && study_.product; ++a)
         if (a != order.axis)
           at += fmt::format("{} {}={}", at.empty() ? " with" : ",", study_.names[a],
@@ -210,7 +210,7 @@ class Page {
     for (const Level& level : study_.levels)
       say("| {} | {} | {} | {} | {} |", level.substeps,
           level.diverged ? "diverged" : cell(rms(level.change), "{:.2e}"), cell(level.order, "{:.2f}"),
-          cell(level.typical, "{:.2e}"), cell(level.typical_order, "{:.2f}"));
+          cell(level.median_strand, "{:.2e}"), cell(level.median_strand_order, "{:.2f}"));
     say("\n{}\n", verdict());
   }
 

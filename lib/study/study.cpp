@@ -28,21 +28,27 @@ void write_text(const fs::path& file, const std::string& text) {
   cache::write_atomically(file, std::as_bytes(std::span(text.data(), text.size())));
 }
 
+// Errors under the reference's last change are as large as that, for all that is known.
 std::vector<Point> points_of(const Study& study) {
   constexpr double kNone = std::numeric_limits<double>::infinity();
+  double unknown = 0;
+  for (const Level& level : study.levels)
+    if (!level.diverged) unknown = level.change ? level.change->rms : 0;
   std::vector<Point> points;
   for (const Row& row : study.rows) {
     const auto& error = row.measured.errors.position;
-    points.push_back({row.timed ? row.timed->milliseconds : kNone, error ? error->rms : kNone});
+    points.push_back(
+        {row.timed ? row.timed->milliseconds : kNone, error ? std::max(error->rms, unknown) : kNone});
   }
   return points;
 }
 
-// What only says how well a step is solved is not to hold up the reference.
+// What only says how well a step is solved is not to hold up the reference; but for its lengths' tolerance,
+// which is one that single precision reaches too, so that its error can be told.
 std::vector<std::string> precise_settings(const scene::Scene& base) {
-  constexpr double kLengthTolerance = 1e-6;
+  constexpr double kLengthTolerance = 1e-5;
   const auto& lengths = base.effects.inextensible;
-  if (!lengths) return {};
+  if (!lengths || lengths->cadence == scene::Cadence::kFrame) return {};
   std::vector<std::string> settings = {"/effects/inextensible/metric=\"step\""};
   if (lengths->tolerance > kLengthTolerance)
     settings.push_back(fmt::format("/effects/inextensible/tolerance={}", kLengthTolerance));
@@ -350,13 +356,13 @@ std::vector<Order> orders_of(const Study& study) {
       std::sort(order.rows.begin(), order.rows.end(), [&](std::size_t x, std::size_t y) {
         return *numeric(study.rows[x].columns[a]) < *numeric(study.rows[y].columns[a]);
       });
-      std::vector<double> errors, typical;
+      std::vector<double> errors, median_strand;
       for (const std::size_t k : order.rows) {
         order.values.push_back(*numeric(study.rows[k].columns[a]));
         errors.push_back(study.rows[k].measured.errors.position->rms);
-        typical.push_back(study.rows[k].measured.errors.typical.value_or(0));
+        median_strand.push_back(study.rows[k].measured.errors.median_strand.value_or(0));
       }
-      order.orders = orders(order.values, errors), order.typical = orders(order.values, typical);
+      order.orders = orders(order.values, errors), order.median_strand = orders(order.values, median_strand);
       found.push_back(std::move(order));
     }
   }

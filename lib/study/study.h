@@ -60,7 +60,7 @@ struct Order {  // of convergence along an axis, all other settings the same
   std::size_t axis;
   std::vector<std::size_t> rows;       // by value
   std::vector<double> values, orders;  // one order fewer than values; of the RMS error
-  std::vector<double> typical;         // of the median strand's
+  std::vector<double> median_strand;   // of the median strand's
 };
 
 struct Study {

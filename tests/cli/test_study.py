@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from conftest import run
-from tiny import STRANDS, PARTICLES, data_bytes, strands, write_scene
+from tiny import LENGTH, STRANDS, PARTICLES, data_bytes, strands, write_scene
 from tiny_mesh import write_mesh_scene
 
 QUICK = ("--frames", "1-3", "--repeats", "1")
@@ -140,9 +140,20 @@ def test_stiff_strands_whose_lengths_are_held_converge_in_the_metric_of_the_step
 
     scene = write_scene(tmp_path, change, FEW)
     told, _ = study(program, scene, tmp_path / "study", *QUICK, "--vary", "/effects/inextensible/metric=step")
-    assert told["reference"]["set"] == ['/effects/inextensible/metric="step"', "/effects/inextensible/tolerance=1e-06"]
+    assert told["reference"]["set"] == ['/effects/inextensible/metric="step"', "/effects/inextensible/tolerance=1e-05"]
     orders = [level["order_of_median_strand"] for level in told["reference"]["levels"]]
-    assert orders[:2] == [None, None] and orders[2:] == pytest.approx([1] * len(orders[2:]), abs=0.1)
+    assert len(orders) >= 4 and orders[:2] == [None, None]
+    assert orders[2:] == pytest.approx([1] * len(orders[2:]), abs=0.1)
+    # Single precision reaches the reference's tolerance: its error is that of its rounding.
+    assert 0 < told["reference"]["float_error"]["errors"]["error"]["rms"] < 1e-5 * LENGTH
+
+
+def test_no_error_is_told_below_the_references_own(program, scene, tmp_path):
+    """A reference no finer than the scene: an error that happens to be small meets no target."""
+    options = ("--vary", "/model/substeps=4,8", "--reference-cap", "8", "--target", "1e-7")
+    told, rows = study(program, scene, tmp_path / "study", *QUICK, *options, code=1)
+    assert min(float(row["error_rms"]) for row in rows) < 1e-7 < told["reference"]["levels"][-1]["change"]["rms"]
+    assert told["answers"]["picked"] is None
 
 
 # ---- the grid's pressure
@@ -159,7 +170,7 @@ def test_of_a_scene_with_a_grid_the_pressures_order_is_measured(program, scene, 
     assert len(re.findall(r"^pressure: \d+ cells across, error", result.stdout, re.MULTILINE)) == 4
     told = json.loads((out / "study.json").read_text())["pressure"]
     levels = told["levels"]
-    assert told["expected_order"] == 2 and [level["cells_across"] for level in levels] == [16, 32, 64, 128]
+    assert told["expected_order"] == 2 and [level["cells_across"] for level in levels] == [8, 16, 32, 64]
     assert all(level["residual"] <= told["residual"] <= 1e-10 and level["iterations"] > 0 for level in levels)
     for kind in ("rms", "largest"):
         errors = [level[kind] for level in levels]
@@ -180,7 +191,7 @@ def test_of_a_scene_with_a_grid_the_pressures_order_is_measured(program, scene, 
     cut["pressure"]["levels"] = levels[:3]
     (out / "study.json").write_text(json.dumps(cut))
     again = run(program, "study", scene, "-o", out, "--resume", *SHORT, "--set", GRID)
-    assert re.findall(r"^pressure: (\d+) cells", again.stdout, re.MULTILINE) == ["128"]
+    assert re.findall(r"^pressure: (\d+) cells", again.stdout, re.MULTILINE) == ["64"]
     assert json.loads((out / "study.json").read_text())["pressure"] == told
 
 
@@ -222,7 +233,7 @@ def test_every_setting_is_varied_by_its_pointer(program, whole, tmp_path):
     assert "wind" not in by_label["wind=null"]["stages_ms"] and "wind" in by_label["as given"]["stages_ms"]
     for label in by_label:
         assert all(by_label[label]["errors"][name] for name in ("error", "volume", "penetration")), label
-    assert by_label["wind=null"]["errors"]["error"]["rms"] > 10 * by_label["as given"]["errors"]["error"]["rms"]
+    assert by_label["wind=null"]["errors"]["error"]["rms"] > 4 * by_label["as given"]["errors"]["error"]["rms"]
 
 
 def test_of_all_strands_only_those_that_are_the_same_are_compared(program, tmp_path):

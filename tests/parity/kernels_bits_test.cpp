@@ -25,6 +25,11 @@ struct Crowd {
   RootPose pose(std::size_t strand, int step) const { return step % 2 ? after[strand] : before[strand]; }
 };
 
+struct Model {
+  Springs springs;
+  bool lengths_in_step;
+};
+
 template <class Machine>
 class KernelBits : public OnMachine<Machine> {
  protected:
@@ -37,15 +42,15 @@ class KernelBits : public OnMachine<Machine> {
   }
   // The strands listed, run together; their final states.
   template <class On>
-  static std::vector<oracle::State> run(Springs springs, const std::vector<std::size_t>& which,
+  static std::vector<oracle::State> run(const Model& model, const std::vector<std::size_t>& which,
                                         int at_a_time = 0) {
     static const Crowd crowd;
     std::vector<oracle::Strand> strands;
     std::vector<RootPose> poses;
     for (const std::size_t k : which) strands.push_back(crowd.strands[k]), poses.push_back(crowd.before[k]);
     strands[0].drag = 1, strands[0].damping = 1.0 / 60;  // for all
-    StrandRun<On> run(strands, poses, true, springs);
-    run.parameters.length_iterations = 3, run.parameters.lengths_in_step = true;
+    StrandRun<On> run(strands, poses, true, model.springs);
+    run.parameters.length_iterations = 3, run.parameters.lengths_in_step = model.lengths_in_step;
     run.soften({1, 0.01, 0.2, {0.01}, {{0.01, 1, -2, 0}}}, true);
     run.blow({3, 1, -2}, {nullptr, {40, 9}, {20, 1}});
     for (std::size_t k = 0; k < which.size(); ++k) run.set(k, crowd.states[which[k]]);
@@ -71,10 +76,13 @@ class KernelBits : public OnMachine<Machine> {
 };
 TYPED_TEST_SUITE(KernelBits, Machines, MachineNames);
 
-constexpr Springs kModels[] = {Springs::kAms, Springs::kMassSpring};
+constexpr Model kModels[] = {{Springs::kAms, false},
+                             {Springs::kAms, true},
+                             {Springs::kMassSpring, false},
+                             {Springs::kMassSpring, true}};
 
 TYPED_TEST(KernelBits, DoNotDependOnTheBatchsOtherStrands) {
-  for (const Springs model : kModels) {
+  for (const Model& model : kModels) {
     const auto together = this->template run<TypeParam>(model, this->all());
     for (std::size_t k = 0; k < together.size(); k += 3)
       this->expect_same(this->template run<TypeParam>(model, {k}), {together[k]});
@@ -82,7 +90,7 @@ TYPED_TEST(KernelBits, DoNotDependOnTheBatchsOtherStrands) {
 }
 
 TYPED_TEST(KernelBits, DoNotDependOnHowBatchesAreShared) {
-  for (const Springs model : kModels) {
+  for (const Model& model : kModels) {
     const auto together = this->template run<TypeParam>(model, this->all());
     for (const int at_a_time : {1, 2})
       this->expect_same(this->template run<TypeParam>(model, this->all(), at_a_time), together);
@@ -91,7 +99,7 @@ TYPED_TEST(KernelBits, DoNotDependOnHowBatchesAreShared) {
 
 TYPED_TEST(KernelBits, AreThoseOfTheScalarKernels) {
   if (!TypeParam::kFused) GTEST_SKIP() << TypeParam::name() << " has no fused multiply-add";
-  for (const Springs model : kModels)
+  for (const Model& model : kModels)
     this->expect_same(this->template run<TypeParam>(model, this->all()),
                       this->template run<ScalarMachine<typename TypeParam::T>>(model, this->all()));
 }

@@ -29,8 +29,10 @@ kernels::StrandParameters<T> strand_parameters(const scene::Scene& scene) {
   if (const auto& lengths = scene.effects.inextensible) {
     p.length_iterations = lengths->max_iterations;
     p.length_tolerance = static_cast<T>(lengths->tolerance);
-    p.lengths_in_step = lengths->metric == scene::LengthMetric::kStep ||
-                        (lengths->metric == scene::LengthMetric::kAuto && model.substep_choice);
+    const bool asked = lengths->metric == scene::LengthMetric::kStep ||
+                       (lengths->metric == scene::LengthMetric::kAuto && model.substep_choice);
+    // Once a frame the displacement is that of many steps, and none has its matrix.
+    p.lengths_in_step = asked && lengths->cadence == scene::Cadence::kSubstep;
   }
   p.strain_limit = static_cast<T>(scene.limits.edge_strain);
   p.speed_limit = static_cast<T>(scene.limits.speed);

@@ -2,6 +2,8 @@
 // sections 3 and 5), collisions of external vertices, and the rest of the mesh taken along (hair mesh
 // paper, 3.2).
 #pragma once
+#include <limits>
+
 #include "kernels/hairmesh/deformation_minimisation.h"
 #include "kernels/hairmesh/filtered_conjugate_gradients.h"
 #include "kernels/hairmesh/hair_mesh_contact.h"
@@ -58,7 +60,7 @@ class MeshStepper final : public HairMeshSolver<T> {
     zero_values(count, held_), zero_values(count, holder_), zero_values(count, moved_in_);
     zero_values(count, contact_of_);
     roots_.resize(4 * static_cast<std::size_t>(columns_));
-    contacts_.resize(count), corrected_.resize(count);
+    contacts_.resize(count), corrected_.resize(count), turned_.resize(count);
     for (std::int32_t v = 0; v < vertices_; ++v) position()[v] = padded(mesh.rest + 3 * v);
   }
 
@@ -97,17 +99,12 @@ class MeshStepper final : public HairMeshSolver<T> {
   }
 
   SolveFigures solve() override {
-    filter_.clear();
-    for (std::int32_t k = 0; k < contact_count_; ++k) {
-      const MeshContact<T>& contact = contacts_.data()[k];
-      if (contact.sticks)
-        filter_.prescribe_wholly(contact.vertex);
-      else
-        filter_.prescribe_along(contact.vertex, padded(contact.normal));
+    SolveFigures figures = solve_held();
+    for (int round = 0; round < kMostRounds && stop_turned(); ++round) {
+      const SolveFigures more = solve_held();
+      figures.iterations += more.iterations;
+      if (!(more.residual <= figures.residual)) figures.residual = more.residual;
     }
-    matrix_.factor(filter_);
-    const SolveFigures figures =
-        gradients_.solve(matrix_, filter_, tolerance_, iterations_, vectors(impulse_), vectors(change_));
     for (std::int32_t i = 0; i < vertices_; ++i) velocity()[i] += vectors(change_)[i];
     release_all();
     for (std::int32_t k = 0; k < contact_count_; ++k) rub(contacts_.data()[k], vectors(carried_)[k]);
@@ -207,8 +204,8 @@ class MeshStepper final : public HairMeshSolver<T> {
                               sheets_.bytes() + bends_.bytes() + volumes_.bytes() + external_.bytes() +
                               samples_.bytes() + surface_.bytes();
     return total + mass_.bytes() + 8 * position_.bytes() + roots_.bytes() + filter_.bytes() +
-           corrected_.bytes() + held_.bytes() + holder_.bytes() + moved_in_.bytes() + contact_of_.bytes() +
-           contacts_.bytes();
+           corrected_.bytes() + turned_.bytes() + held_.bytes() + holder_.bytes() + moved_in_.bytes() +
+           contact_of_.bytes() + contacts_.bytes();
   }
 
   const BlockMatrix<T>& matrix() const { return matrix_; }
@@ -217,6 +214,7 @@ class MeshStepper final : public HairMeshSolver<T> {
 
  private:
   // kReleased: its surface had to hold it back in this step, which no surface does.
+  static constexpr int kMostRounds = 8;
   enum Held : char { kFree, kSlides, kSticks, kReleased };
 
   static Padded<T>* vectors(const HostBuffer<T>& buffer) {
@@ -255,6 +253,49 @@ class MeshStepper final : public HairMeshSolver<T> {
     }
   }
 
+  // The change of velocity that the system makes of what contacts leave free.
+  SolveFigures solve_held() {
+    filter_.clear();
+    for (std::int32_t k = 0; k < contact_count_; ++k) {
+      const MeshContact<T>& contact = contacts_.data()[k];
+      if (contact.sticks)
+        filter_.prescribe_wholly(contact.vertex);
+      else
+        filter_.prescribe_along(contact.vertex, padded(contact.normal));
+    }
+    matrix_.factor(filter_);
+    return gradients_.solve(matrix_, filter_, tolerance_, iterations_, vectors(impulse_), vectors(change_));
+  }
+
+  // What slides is stopped where friction would turn its motion: it sticks from the step's start, and the
+  // rest is to be solved anew. Stopped after the solve it would leave the rest where hair that slid on would
+  // have taken it, which then jerks at what sticks, and hair that chatters so never comes to rest.
+  bool stop_turned() {
+    std::int32_t* turned = turned_.data();
+    std::int32_t count = 0;
+    for (std::int32_t k = 0; k < contact_count_; ++k) {
+      const MeshContact<T>& contact = contacts_.data()[k];
+      if (contact.sticks) continue;
+      const Padded<T> relative =
+          velocity()[contact.vertex] + vectors(change_)[contact.vertex] - padded(contact.velocity);
+      if (turns(relative, contact)) turned[count++] = k;
+    }
+    if (count == 0) return false;
+    Padded<T>*stop = vectors(change_), *taken = vectors(before_);
+    for (std::int32_t i = 0; i < vertices_; ++i) stop[i] = Padded<T>{};
+    for (; count > 0; --count) {
+      MeshContact<T>& contact = contacts_.data()[turned[count - 1]];
+      const std::int32_t i = contact.vertex;
+      contact.sticks = 1;
+      stop[i] = padded(contact.velocity) - velocity()[i];
+      velocity()[i] += stop[i];
+      vectors(impulse_)[i] -= step_ * padded(contact.force);
+    }
+    gradients_.multiply(matrix_, stop, taken);
+    for (std::int32_t i = 0; i < vertices_; ++i) vectors(impulse_)[i] -= taken[i];
+    return true;
+  }
+
   // What holding a vertex took, as an impulse, with that of `prescribe`. One that had to be held back, which
   // no surface does, is let go. One that sticks slides when that took more than Coulomb's cone allows, and
   // from then on has the cone's force against its motion; until the force would turn its motion, when it
@@ -274,13 +315,23 @@ class MeshStepper final : public HairMeshSolver<T> {
     } else {
       const Padded<T> relative = velocity()[i] - padded(contact.velocity);
       direction = dot_product(n, relative) * n - relative;
-      held_.data()[i] = dot_product(direction, padded(contact.force)) < T(0) ? kSticks : kSlides;
+      held_.data()[i] = stops(i, relative, contact) ? kSticks : kSlides;
       if (held_.data()[i] == kSticks) velocity()[i] += direction;
     }
     const T size = sqrt(square(direction));
     const T scale =
         held_.data()[i] == kSlides && size > T(0) ? contact.friction * push / (size * step_) : T(0);
     vectors(rubbing_)[i] = scale * direction;
+  }
+  static RINGLET_KERNEL bool turns(Padded<T> relative, const MeshContact<T>& contact) {
+    return dot_product(relative, padded(contact.force)) > T(0);
+  }
+  // What moves less in a step than rounding does has no direction for friction to act against.
+  RINGLET_KERNEL bool stops(std::int32_t i, Padded<T> relative, const MeshContact<T>& contact) const {
+    constexpr T kRounding = std::numeric_limits<T>::epsilon();
+    return turns(relative, contact) ||
+           (contact.friction > T(0) &&
+            step_ * step_ * square(relative) <= kRounding * kRounding * square(position()[i]));
   }
   static RINGLET_KERNEL T square(Padded<T> a) { return dot_product(a, a); }
 
@@ -401,6 +452,7 @@ class MeshStepper final : public HairMeshSolver<T> {
   VertexFilter<T> filter_;
   FilteredConjugateGradients<T> gradients_;
   HostBuffer<T> mass_, position_, velocity_, impulse_, change_, displacement_, before_, roots_;
+  HostBuffer<std::int32_t> turned_;      // in contacts_: those that friction stopped in this solve
   HostBuffer<std::int32_t> corrected_;   // since they were last minimised
   HostBuffer<std::int32_t> moved_in_;    // [vertices] the last step that did so
   HostBuffer<std::int32_t> contact_of_;  // [vertices] place in contacts_ plus 1; 0: none

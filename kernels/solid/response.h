@@ -373,6 +373,23 @@ struct PackContacts {
     write_back(load<R>(better) > R(0), x, pack.position);
   }
 
+  // No particle is faster than it has moved. A push out of the solid is no motion, but lengths that pull back
+  // what was pushed take that for one: what a solid presses would lie still at a speed. Where lengths make up
+  // for several substeps, how far this one has led is not known.
+  RINGLET_FUNCTION void limit_velocities() {
+    if (step.skipped_substeps > 0) return;
+    for (int l = 0; l < kWidth; ++l) left[l] = figures[l].touched ? T(1) : T(0);
+    const Mask<R> touched = load<R>(left) > R(0);
+    for (int i = 0; i < particles; ++i) {
+      const Vector3<R> before = load3<R>(x + 3 * i * kLanes, kLanes),
+                       after = load3<R>(pack.position + 3 * i * pack.stride, pack.stride),
+                       moved = load3<R>(v + 3 * i * kLanes, kLanes) + lengths.per_h * (after - before);
+      T* to = pack.velocity + 3 * i * pack.stride;
+      const Vector3<R> own = load3<R>(to, pack.stride);
+      store3<R>(to, pack.stride, select(touched & (dot(moved, moved) < dot(own, own)), moved, own));
+    }
+  }
+
   RINGLET_FUNCTION void write_back(Mask<R> chosen) {
     write_back(chosen, x, pack.position);
     write_back(chosen, v, pack.velocity);
@@ -417,7 +434,7 @@ RINGLET_FUNCTION void collide_strands(const ContactStep<Scalar<R>>& step, int ba
   PackContacts<R> contacts(step, batch, lane, scratch, stride);
   contacts.collide();
   if (step.length_iterations > 0)
-    contacts.settle(false);
+    contacts.settle(false), contacts.limit_velocities();
   else
     contacts.find_strains();  // lengths are not held, but limits and figures want to know them
   contacts.write_back(R(1) > R(0));

@@ -22,8 +22,8 @@ struct Bounds {
 Bounds bounds_of(const Scenario& scenario, const Outcome& outcome);
 
 // Fails the test where the outcome is beyond a bound or has diverged; notes each figure and its bound as
-// properties of the test. `seconds`: from the calm to the end; what need not be at rest by then is not held
-// to that.
+// properties of the test. `seconds`: from the calm to the end; what need not be at rest by then is held to
+// its last speed alone.
 void hold(const Outcome& outcome, const Bounds& bounds, double seconds);
 
 // Runs the scenario and holds it to its bounds. Skips the test where the machine is not to be had.

@@ -1,5 +1,6 @@
 // Hard cases, run in process: a scene made in code on one model and machine, and what it did.
 #pragma once
+#include <filesystem>
 #include <functional>
 #include <map>
 #include <span>
@@ -79,6 +80,8 @@ struct Outcome {
 
 // Nothing faster than this is at rest [m/s].
 double at_rest(const Scenario& scenario, const scene::Scene& scene);
+// An OBJ of a box of these half lengths about the origin [m].
+void write_box(const std::filesystem::path& file, const Vec3& half);
 // The scene that a scenario runs, with the files that it names in a folder of this process.
 scene::Scene scene_of(const Scenario& scenario);
 // A run that diverges says so in the outcome; every other error is thrown.

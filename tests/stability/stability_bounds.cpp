@@ -121,12 +121,18 @@ void hold(const char* what, double measured, double bound) {
   EXPECT_TRUE(measured <= bound) << what << " is " << measured << ", at most " << bound << " expected";
 }
 
-// The time from the greatest speed to rest at the slowest mode's rate. What nothing but drag brings back
-// creeps: w^2 / d x exp(-w^2 t / d) is nowhere above x / (e t).
+// What nothing but drag brings back creeps: w^2 / d x exp(-w^2 t / d) is nowhere above x / (e t).
+bool only_dragged(const Motion& motion) { return !(motion.held > 0 || motion.weight > 0); }
+
+// The time from the greatest speed to rest at the slowest mode's rate.
 double time_to_rest(const Motion& motion, double rest, double speed, double reach) {
   const double decayed = std::log(std::max(speed / rest, 1.0)) / motion.slowest_decay();
-  if (motion.held > 0 || motion.weight > 0) return decayed;
-  return std::max(decayed, reach / (std::numbers::e * rest));
+  return only_dragged(motion) ? std::max(decayed, reach / (std::numbers::e * rest)) : decayed;
+}
+// What is left of the greatest speed after a time at that rate.
+double speed_after(const Motion& motion, double speed, double reach, double seconds) {
+  const double left = speed * std::exp(-motion.slowest_decay() * seconds);
+  return only_dragged(motion) ? std::max(left, reach / (std::numbers::e * seconds)) : left;
 }
 
 }  // namespace
@@ -163,9 +169,10 @@ Bounds bounds_of(const Scenario& scenario, const Outcome& outcome) {
   const double turned = std::sqrt(1 + turn * turn) - 1;
   bounds.strain = lengths ? kHeldStrain : std::max({energetic, turned, outcome.strain_at_start});
   bounds.moved_strain = lengths ? kMovedStrain : bounds.strain;
-  const double rest = at_rest(scenario, scene);
+  const double rest = at_rest(scenario, scene), seconds = scenario.seconds - scenario.calm;
   // What creeps ever slower, and by s in all, goes at s / t at most after a time t.
-  bounds.last_speed = scenario.creeps ? std::max(rest, reach / (scenario.seconds - scenario.calm)) : rest;
+  bounds.last_speed =
+      std::max(rest, scenario.creeps ? reach / seconds : speed_after(motion, bounds.speed, reach, seconds));
   bounds.rest = scenario.creeps ? 0 : time_to_rest(motion, rest, bounds.speed, reach);
   return bounds;
 }
@@ -177,8 +184,8 @@ void hold(const Outcome& outcome, const Bounds& bounds, double seconds) {
   hold("strain", outcome.strain, bounds.strain);
   hold("moved_strain", outcome.moved_strain, bounds.moved_strain);
   hold("speed", outcome.speed, bounds.speed);
-  if (bounds.rest <= seconds) hold("last_speed", outcome.last_speed, bounds.last_speed);
-  if (bounds.rest > 0) hold("rest", outcome.rest, bounds.rest);
+  hold("last_speed", outcome.last_speed, bounds.last_speed);
+  if (bounds.rest > 0 && bounds.rest <= seconds) hold("rest", outcome.rest, bounds.rest);
 }
 
 void hold(const Scenario& scenario) {

@@ -45,20 +45,6 @@ void write_hair(const std::filesystem::path& file, const std::vector<Strand>& ha
   groom::write(file, strands, scene::Axis::kY);
 }
 
-// Each side in squares, so that distances to it are told well.
-void write_box(const std::filesystem::path& file, const Vec3& half) {
-  std::ofstream out(file);
-  out.precision(9);
-  constexpr int kFaces[6][4] = {{0, 1, 3, 2}, {4, 6, 7, 5}, {0, 4, 5, 1},
-                                {2, 3, 7, 6}, {0, 2, 6, 4}, {1, 5, 7, 3}};
-  for (int corner = 0; corner < 8; ++corner)
-    out << "v " << (corner & 4 ? 1 : -1) * half.x() << ' ' << (corner & 2 ? 1 : -1) * half.y() << ' '
-        << (corner & 1 ? 1 : -1) * half.z() << '\n';
-  for (const auto& f : kFaces)
-    out << "f " << f[0] + 1 << ' ' << f[1] + 1 << ' ' << f[2] + 1 << "\nf " << f[0] + 1 << ' ' << f[2] + 1
-        << ' ' << f[3] + 1 << '\n';
-}
-
 constexpr const char* kScene = R"({
   "name": "case",
   "frames": {"first": 0, "last": 1},
@@ -344,6 +330,19 @@ double at_rest(const Scenario& scenario, const scene::Scene& scene) {
     if (step * std::sqrt(weight * count * count / length) > 1) rest = std::max(rest, weight * step);
   }
   return rest;
+}
+
+void write_box(const std::filesystem::path& file, const Vec3& half) {
+  std::ofstream out(file);
+  out.precision(9);
+  constexpr int kFaces[6][4] = {{0, 1, 3, 2}, {4, 6, 7, 5}, {0, 4, 5, 1},
+                                {2, 3, 7, 6}, {0, 2, 6, 4}, {1, 5, 7, 3}};
+  for (int corner = 0; corner < 8; ++corner)
+    out << "v " << (corner & 4 ? 1 : -1) * half.x() << ' ' << (corner & 2 ? 1 : -1) * half.y() << ' '
+        << (corner & 1 ? 1 : -1) * half.z() << '\n';
+  for (const auto& f : kFaces)
+    out << "f " << f[0] + 1 << ' ' << f[1] + 1 << ' ' << f[2] + 1 << "\nf " << f[0] + 1 << ' ' << f[2] + 1
+        << ' ' << f[3] + 1 << '\n';
 }
 
 scene::Scene scene_of(const Scenario& scenario) {

@@ -57,16 +57,11 @@ class MeshStepper final : public HairMeshSolver<T> {
     copy_values(mass_, mesh.mass, count);
     zero_values(4 * (count + kBeyond), position_, velocity_, impulse_, change_, displacement_, rubbing_,
                 carried_, before_);
-    zero_values(count, held_), zero_values(count, slipped_), zero_values(count, holder_),
-        zero_values(count, moved_in_);
+    zero_values(count, held_), zero_values(count, holder_), zero_values(count, moved_in_);
     zero_values(count, contact_of_);
     roots_.resize(4 * static_cast<std::size_t>(columns_));
     contacts_.resize(count), corrected_.resize(count), turned_.resize(count);
     for (std::int32_t v = 0; v < vertices_; ++v) position()[v] = padded(mesh.rest + 3 * v);
-    length_.resize(count);
-    for (std::int32_t v = 0; v < vertices_; ++v)
-      length_.data()[v] =
-          v % layers_ == 0 ? T(0) : length_.data()[v - 1] + sqrt(square(position()[v] - position()[v - 1]));
   }
 
   void set_state(const T* x, const T* v) override {
@@ -208,9 +203,9 @@ class MeshStepper final : public HairMeshSolver<T> {
     const std::size_t total = matrix_.bytes() + laplacian_.bytes() + gradients_.bytes() + springs_.bytes() +
                               sheets_.bytes() + bends_.bytes() + volumes_.bytes() + external_.bytes() +
                               samples_.bytes() + surface_.bytes();
-    return total + length_.bytes() + mass_.bytes() + 8 * position_.bytes() + roots_.bytes() +
-           filter_.bytes() + corrected_.bytes() + turned_.bytes() + held_.bytes() + slipped_.bytes() +
-           holder_.bytes() + moved_in_.bytes() + contact_of_.bytes() + contacts_.bytes();
+    return total + mass_.bytes() + 8 * position_.bytes() + roots_.bytes() + filter_.bytes() +
+           corrected_.bytes() + turned_.bytes() + held_.bytes() + holder_.bytes() + moved_in_.bytes() +
+           contact_of_.bytes() + contacts_.bytes();
   }
 
   const BlockMatrix<T>& matrix() const { return matrix_; }
@@ -218,9 +213,8 @@ class MeshStepper final : public HairMeshSolver<T> {
   const Padded<T>* change() const { return vectors(change_); }
 
  private:
-  static constexpr int kMostRounds = 8;
-  static constexpr T kBroken = T(1.5);  // hair that long is, of its length at rest
   // kReleased: its surface had to hold it back in this step, which no surface does.
+  static constexpr int kMostRounds = 8;
   enum Held : char { kFree, kSlides, kSticks, kReleased };
 
   static Padded<T>* vectors(const HostBuffer<T>& buffer) {
@@ -249,7 +243,6 @@ class MeshStepper final : public HairMeshSolver<T> {
         vectors(roots_)[c] = padded(roots + 3 * c);
         velocity()[c * layers_] = per_step * (vectors(roots_)[c] - position()[c * layers_]);
       }
-    let_go();
     for (std::int32_t k = 0; k < contact_count_; ++k) {
       const MeshContact<T>& contact = contacts_.data()[k];
       const Padded<T> n = padded(contact.normal);
@@ -303,21 +296,6 @@ class MeshStepper final : public HairMeshSolver<T> {
     return true;
   }
 
-  // Of what is in contact, that which its surface would take farther than hair goes.
-  void let_go() {
-    const std::int32_t count = contact_count_;
-    forget_contacts();
-    for (std::int32_t k = 0; k < count; ++k) {
-      MeshContact<T> contact = contacts_.data()[k];
-      const std::int32_t i = contact.vertex;
-      Padded<T> way = padded(contact.velocity);
-      if (!contact.sticks) way = dot_product(padded(contact.normal), way) * padded(contact.normal);
-      if (slips(i, position()[i] + step_ * way, contact)) continue;
-      if (!(contact.friction > T(0))) contact.sticks = 0, store_three(contact.force, Padded<T>{});
-      keep(contact);
-    }
-  }
-
   // What holding a vertex took, as an impulse, with that of `prescribe`. One that had to be held back, which
   // no surface does, is let go. One that sticks slides when that took more than Coulomb's cone allows, and
   // from then on has the cone's force against its motion; until the force would turn its motion, when it
@@ -366,13 +344,8 @@ class MeshStepper final : public HairMeshSolver<T> {
       MeshSurfacePoint<T> found;
       T before[3], point[3];
       store_three(before, vectors(before_)[i]), store_three(point, position()[i]);
-      slipped_.data()[i] = 0;
       if (!find(before, point, held_by(i, solid) ? reach_ : T(0), found)) continue;
       const Padded<T> n = padded(found.normal), out = padded(found.point) - position()[i];
-      if (slips(i, padded(found.point), found)) {
-        slipped_.data()[i] = 1, take_along(i, found);
-        continue;
-      }
       const T depth = dot_product(n, out);
       if (depth > T(0)) {
         depth_ = max(depth_, static_cast<double>(depth));
@@ -384,28 +357,6 @@ class MeshStepper final : public HairMeshSolver<T> {
     }
     for (const MeshSample<T>& sample : samples_)
       if (sample.span > radius) collide_between(find, solid, sample);
-  }
-  // Whether hair slips off a surface that would hold it there. A mesh is caught where its faces meet
-  // something with their middles, strands are not: before hair breaks nothing rubs on it any more, and no
-  // surface pushes it on, within 60 degrees of away from its root.
-  template <class Surface>
-  bool slips(std::int32_t i, Padded<T> there, Surface& found) const {
-    const Padded<T> from_root = there - position()[i / layers_ * layers_];
-    const T longest = kBroken * length_.data()[i], stretched = square(from_root);
-    if (!held_roots_ || !(stretched > longest * longest)) return false;
-    found.friction = T(0);
-    const T away = dot_product(from_root, padded(found.normal));
-    return away > T(0) && T(4) * away * away > stretched;
-  }
-  // As far as hair goes, by no more than the surface has moved it, whatever has passed through it in a step.
-  void take_along(std::int32_t i, const MeshSurfacePoint<T>& found) {
-    const Padded<T> n = padded(found.normal), root = position()[i / layers_ * layers_],
-                    there = padded(found.point) - root;
-    const Padded<T> out = root + (kBroken * length_.data()[i] / sqrt(square(there))) * there - position()[i];
-    const T depth = dot_product(n, out), way = step_ * dot_product(n, padded(found.velocity));
-    if (!(depth > T(0) && way > T(0))) return;
-    correct(i, min(T(1), way / depth) * out);
-    velocity()[i] -= min(T(0), dot_product(n, velocity()[i])) * n;
   }
   bool held_by(std::int32_t i, std::int32_t solid) const {
     return (held_.data()[i] == kSlides || held_.data()[i] == kSticks) && holder_.data()[i] == solid;
@@ -430,10 +381,6 @@ class MeshStepper final : public HairMeshSolver<T> {
     if (!find(before, point, held ? reach_ - slack : -slack, found)) return;
     const Padded<T> n = padded(found.normal), out = padded(found.point) - slack * n - padded(point);
     const T depth = dot_product(n, out);
-    for (std::int32_t k = 0; k < count; ++k) {
-      const std::int32_t i = sample.vertex[k];
-      if (slipped_.data()[i] != 0 || slips(i, position()[i] + max(depth, T(0)) * n, found)) return;
-    }
     if (depth > T(0)) depth_ = max(depth_, static_cast<double>(depth));
     for (std::int32_t k = 0; k < count; ++k) {
       if (depth > T(0)) correct(sample.vertex[k], out);
@@ -467,8 +414,8 @@ class MeshStepper final : public HairMeshSolver<T> {
 
   // The last surface that a vertex meets holds it.
   void hold(std::int32_t i, std::int32_t solid, const MeshSurfacePoint<T>& found) {
-    const bool known = holder_.data()[i] == solid && found.friction > T(0),
-               slides = known && held_.data()[i] == kSlides, sticks = known && held_.data()[i] == kSticks;
+    const bool known = holder_.data()[i] == solid, slides = known && held_.data()[i] == kSlides,
+               sticks = known && held_.data()[i] == kSticks;
     MeshContact<T> contact{i, solid, sticks, {}, {}, {}, found.friction};
     for (int c = 0; c < 3; ++c) contact.normal[c] = found.normal[c], contact.velocity[c] = found.velocity[c];
     if (slides) store_three(contact.force, vectors(rubbing_)[i]);
@@ -504,13 +451,11 @@ class MeshStepper final : public HairMeshSolver<T> {
   MeshLaplacian<T> laplacian_;
   VertexFilter<T> filter_;
   FilteredConjugateGradients<T> gradients_;
-  HostBuffer<T> length_;  // [vertices] of the hair from the root to there, at rest [m]
   HostBuffer<T> mass_, position_, velocity_, impulse_, change_, displacement_, before_, roots_;
   HostBuffer<std::int32_t> turned_;      // in contacts_: those that friction stopped in this solve
   HostBuffer<std::int32_t> corrected_;   // since they were last minimised
   HostBuffer<std::int32_t> moved_in_;    // [vertices] the last step that did so
   HostBuffer<std::int32_t> contact_of_;  // [vertices] place in contacts_ plus 1; 0: none
-  HostBuffer<char> slipped_;             // [vertices] whether it did so off the solid at hand
   HostBuffer<char> held_;                // how a surface that pushed it held a vertex in the last solve
   HostBuffer<std::int32_t> holder_;      // which
   HostBuffer<MeshContact<T>> contacts_;

@@ -5,7 +5,7 @@ import h5py
 import numpy as np
 import pytest
 
-from conftest import run
+from conftest import SOURCE, run
 from tiny import LAST, RADIUS, figures, steps, write_scene
 from tiny_mesh import ACROSS, LAYERS, write_mesh_scene
 
@@ -129,6 +129,16 @@ def test_a_level_set_that_flies_through_within_a_frame_takes_the_hair_along(prog
     before, after = (positions(tmp_path / "out", frame) for frame in (2, 3))
     met = (np.abs(before[:, 1] - level) < 0.01) & (np.abs(before[:, 2]) < 0.01)
     assert met.any() and (after[met, 0] - before[met, 0]).mean() > 0.03
+
+
+def test_the_walk_at_ten_times_its_speed_comes_back(program, tmp_path):
+    """Around a head and shoulders that hair is thrown against, within the scene's own limits."""
+    options = ["-q", "--set=/motion/speed=10", "--set=/groom/hair_mesh/strands=50", '--set=/name="tiny"']
+    result = run(program, "run", SOURCE / "scenes/hair_mesh/walk.json", "-o", tmp_path / "out", *options)
+    assert result.returncode == 0, result.stderr
+    assert 2 < figures(tmp_path / "out", "mesh_strain").max() < 10, "it is thrown, and not beyond the limits"
+    assert figures(tmp_path / "out", "mesh_speed")[-1] < 0.1
+    assert figures(tmp_path / "out", "mesh_volume")[-1] > 0.9
 
 
 def test_the_plan_has_what_the_scene_calls_for(program, scene):

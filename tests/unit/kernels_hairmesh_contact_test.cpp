@@ -286,35 +286,4 @@ TEST(HairMeshContact, NothingSmallSlipsThroughAFace) {
 }
 
 }  // namespace
-// A ball that goes on drags hair to half again its length at most, but for the step in which it is let go,
-// and leaves it behind as it was.
-TEST(HairMeshContact, SlipsOffWhatDragsItFartherThanItReaches) {
-  constexpr int kLayers = 4, kSubsteps = 8;
-  constexpr double kSide = 0.16, kHeight = 0.3, kLayer = kHeight / (kLayers - 1);
-  for (const double speed : {1.0, 4.0, 8.0}) {
-    MeshRun<float> run(hanging_lock(1, kLayers, kSide, kHeight));
-    run.frames(48);
-    const double settled = run.solver->volume(), step = 1 / (24.0 * kSubsteps);
-    run.step.step = static_cast<float>(step);
-    kernels::MeshEllipsoid<float> ball{};
-    for (int k = 0; k < 3; ++k) ball.axis[k][k] = 1, ball.radius[k] = 0.06F;
-    ball.centre[1] = -0.15F, ball.velocity[0] = static_cast<float>(speed), ball.friction = 0.3F;
-    double beyond = -1;  // [m]
-    for (int i = 1; ball.centre[0] < 1; ++i) {
-      ball.centre[0] = static_cast<float>(-0.3 + i * step * speed);
-      run.frame();
-      run.solver->collide(&ball, 1);
-      if (i % kSubsteps == 0) run.solver->minimise();
-      run.get();
-      for (int v = 0; v < run.vertices(); ++v) {
-        const int layer = v % kLayers;
-        beyond = std::max(beyond, (run.at(v) - run.at(v - layer)).norm() - 1.5 * kLayer * layer);
-      }
-    }
-    EXPECT_LE(beyond, speed * step) << speed;
-    run.frames(4 * 24 * kSubsteps);
-    EXPECT_NEAR(run.solver->volume() / settled, 1, 1e-3) << speed;
-  }
-}
-
 }  // namespace ringlet::kernels_testing

@@ -287,6 +287,26 @@ void make_forceless(StrandRun<Machine>& run) {
   run.parameters.drag = run.parameters.damping = 0;
 }
 
+// A strand that falls from rest in so many steps, its lengths held to 1e-7: its particles after 1/12 s.
+inline constexpr double kFallSeconds = 1.0 / 12;
+template <class Machine>
+oracle::Points fallen(const oracle::Strand& strand, Springs springs, int steps, bool lengths_in_step) {
+  using T = typename Machine::T;
+  StrandRun<Machine> run({strand}, {RootPose{}}, false, springs);
+  run.parameters.gravity[1] = T(-9.81), run.parameters.damping = T(1.0 / 60);
+  run.parameters.length_iterations = 8, run.parameters.length_tolerance = T(1e-7);
+  run.parameters.lengths_in_step = lengths_in_step;
+  for (int k = 0; k < steps; ++k) run.step({RootPose{}}, kFallSeconds / steps);
+  return run.get(0).position;
+}
+// The order by which steps of 1/3840 s, then halved twice, bring it there.
+template <class Machine>
+double order_of_fall(const oracle::Strand& strand, Springs springs, bool lengths_in_step) {
+  const auto end_of = [&](int steps) { return fallen<Machine>(strand, springs, steps, lengths_in_step); };
+  const oracle::Points coarse = end_of(320), middle = end_of(640), fine = end_of(1280);
+  return std::log2((middle - coarse).norm() / (fine - middle).norm());
+}
+
 // One strand through `steps` of the helix's steps by the kernels.
 template <class Machine>
 oracle::HelixOutcome run_helix_on(StrandRun<Machine>& run, const oracle::Strand& strand,

@@ -18,9 +18,9 @@
 
 namespace ringlet::pipeline {
 
-// The strands' step is of order 1. What acts on positions or velocities beside it (lengths held, solids, hair
-// against hair) makes errors fall more slowly while the stiffest springs are not resolved: of scenes with any
-// of these order 1/2 is assumed. Where errors fall more slowly than that, more than e is left.
+// The strands' step is of order 1. With few substeps errors fall more slowly where something acts on
+// positions or velocities beside it (lengths held, solids, hair against hair): of scenes with any of these
+// order 1/2 is assumed. Where errors fall faster, less than e is left; where more slowly, more.
 class SubstepControl {
  public:
   // `scene`: one that leaves the choice; `length`: the strands' mean length at rest [m]

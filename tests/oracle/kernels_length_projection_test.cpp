@@ -173,28 +173,15 @@ TYPED_TEST(KernelLengths, LetStiffStrandsConvergeWithTheStep) {
   using T = typename TypeParam::T;
   if (!std::is_same_v<T, double>) GTEST_SKIP() << "steps are as small as float's precision";
   const Strand strand = oracle::make_strand(oracle::helix(), {1e6, 1e6, 1e6, 1e2, 0});
-  constexpr double kSeconds = 1.0 / 12;
-  const auto end_of = [&](int steps, bool in_step) {
-    StrandRun<TypeParam> run({strand}, {RootPose{}}, false);
-    run.parameters.gravity[1] = T(-9.81), run.parameters.damping = T(1.0 / 60);
-    run.parameters.length_iterations = 8, run.parameters.length_tolerance = T(1e-7);
-    run.parameters.lengths_in_step = in_step;
-    for (int k = 0; k < steps; ++k) run.step({RootPose{}}, kSeconds / steps);
-    return run.get(0).position;
-  };
-  const auto order = [&](bool in_step) {
-    const Points coarse = end_of(320, in_step), middle = end_of(640, in_step), fine = end_of(1280, in_step);
-    return std::log2((middle - coarse).norm() / (fine - middle).norm());
-  };
-  EXPECT_NEAR(order(true), 1, 0.1);
-  EXPECT_GT(std::abs(order(false) - 1), 0.1) << "what this is for";
+  EXPECT_NEAR(order_of_fall<TypeParam>(strand, Springs::kAms, true), 1, 0.1);
+  EXPECT_GT(std::abs(order_of_fall<TypeParam>(strand, Springs::kAms, false) - 1), 0.1) << "what this is for";
 
   // What it converges to: the motion of corrections whose tensions are solved for exactly.
   constexpr int kSteps = 320;
   oracle::Strand exact = strand;
   exact.gravity = {0, -9.81, 0}, exact.damping = 1.0 / 60;
   oracle::State state = oracle::rest_state(exact);
-  const oracle::Step step{{}, {}, kSeconds / kSteps};
+  const oracle::Step step{{}, {}, kFallSeconds / kSteps};
   for (int k = 0; k < kSteps; ++k) {
     const oracle::State solved = advance(exact, state, step);
     Points x = solved.position;
@@ -203,8 +190,10 @@ TYPED_TEST(KernelLengths, LetStiffStrandsConvergeWithTheStep) {
     ASSERT_LE(oracle::worst_edge_strain(exact, x), 1e-7);
     state = with_projected(solved, x, step.h);
   }
-  const double by_masses = (end_of(kSteps, false) - state.position).norm(),
-               in_step = (end_of(kSteps, true) - state.position).norm();
+  const auto off = [&](bool in_step) {
+    return (fallen<TypeParam>(strand, Springs::kAms, kSteps, in_step) - state.position).norm();
+  };
+  const double by_masses = off(false), in_step = off(true);
   EXPECT_LT(in_step, 0.05 * by_masses) << by_masses;
 }
 

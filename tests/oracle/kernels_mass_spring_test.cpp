@@ -369,21 +369,9 @@ TYPED_TEST(KernelMassSpring, ConvergesWithTheStepWhileItsLengthsAreHeld) {
   using T = typename TypeParam::T;
   if (!std::is_same_v<T, double>) GTEST_SKIP() << "steps are as small as float's precision";
   const oracle::Strand strand = this->helix(false);
-  constexpr double kSeconds = 1.0 / 12;
-  const auto end_of = [&](int steps, bool in_step) {
-    StrandRun<TypeParam> run({strand}, {RootPose{}}, false, Springs::kMassSpring);
-    run.parameters.gravity[1] = T(-9.81), run.parameters.damping = T(1.0 / 60);
-    run.parameters.length_iterations = 8, run.parameters.length_tolerance = T(1e-7);
-    run.parameters.lengths_in_step = in_step;
-    for (int k = 0; k < steps; ++k) run.step({RootPose{}}, kSeconds / steps);
-    return run.get(0).position;
-  };
-  const auto order = [&](bool in_step) {
-    const Points coarse = end_of(320, in_step), middle = end_of(640, in_step), fine = end_of(1280, in_step);
-    return std::log2((middle - coarse).norm() / (fine - middle).norm());
-  };
-  EXPECT_NEAR(order(true), 1, 0.1);
-  EXPECT_GT(std::abs(order(false) - 1), 0.1) << "what this is for";
+  EXPECT_NEAR(order_of_fall<TypeParam>(strand, Springs::kMassSpring, true), 1, 0.1);
+  EXPECT_GT(std::abs(order_of_fall<TypeParam>(strand, Springs::kMassSpring, false) - 1), 0.1)
+      << "what this is for";
 }
 
 TYPED_TEST(KernelMassSpring, LiesOnASolidAsAmsDoes) {

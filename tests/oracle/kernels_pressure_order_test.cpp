@@ -7,6 +7,7 @@
 #include <random>
 #include <vector>
 
+#include "grid_support.h"
 #include "kernels/launch/pressure.h"
 #include "study/manufactured_pressure.h"
 
@@ -15,21 +16,13 @@ namespace {
 
 using kernels::InstructionSet;
 
-// Chunks in an order that differs from call to call.
-void shuffled(void* generator, int chunks, void (*body)(const void*, int), const void* context) {
-  std::vector<int> order(chunks);
-  for (int k = 0; k < chunks; ++k) order[k] = k;
-  std::shuffle(order.begin(), order.end(), *static_cast<std::mt19937*>(generator));
-  for (const int chunk : order) body(context, chunk);
-}
-
 template <class T>
 class KernelPressureOrder : public testing::Test {
  protected:
   std::vector<double> solve(InstructionSet set, const study::ManufacturedPressure<T>& manufactured) {
     std::vector<double> pressure(manufactured.cells());
-    const auto told = kernels::solve_pressure(set, {shuffled, &generator_}, manufactured.problem(), 1e-10,
-                                              200, pressure.data());
+    const auto told = kernels::solve_pressure(set, {chunks_shuffled, &generator_}, manufactured.problem(),
+                                              1e-10, 200, pressure.data());
     EXPECT_TRUE(told.compressed);
     EXPECT_LE(told.residual, 1e-10);
     return pressure;

@@ -13,6 +13,7 @@
 #include <random>
 #include <vector>
 
+#include "grid_support.h"
 #include "kernels/backend/host.h"
 #include "kernels/grid/pressure.h"
 
@@ -25,17 +26,6 @@ using kernels::Host;
 using kernels::kDirections;
 using At = std::array<int, 3>;
 constexpr double kPi = std::numbers::pi;
-
-// Every chunk in turn, or in an order that differs from call to call.
-void in_turn(void*, int chunks, void (*body)(const void*, int), const void* context) {
-  for (int chunk = 0; chunk < chunks; ++chunk) body(context, chunk);
-}
-void shuffled(void* generator, int chunks, void (*body)(const void*, int), const void* context) {
-  std::vector<int> order(chunks);
-  for (int k = 0; k < chunks; ++k) order[k] = k;
-  std::shuffle(order.begin(), order.end(), *static_cast<std::mt19937*>(generator));
-  for (const int chunk : order) body(context, chunk);
-}
 
 // A seven-point problem on some cells of a lattice of n x n x n, as the kernels are given it: its numbers are
 // those of T, and the reference's are the same.
@@ -112,7 +102,7 @@ struct Solver {
   Host host;
   kernels::Pressure<Host, T> pressure;
 
-  explicit Solver(const Lattice<T>& lattice, kernels::HostThreads threads = {in_turn, nullptr})
+  explicit Solver(const Lattice<T>& lattice, kernels::HostThreads threads = {chunks_in_turn, nullptr})
       : host(threads) {
     const int n = lattice.size();
     auto& fine = pressure.multigrid.level[0];
@@ -407,7 +397,7 @@ TYPED_TEST(KernelPressure, DependsOnNoEarlierProblemAndNoOrderOfChunks) {
       20, [&](At a) { return this->noise(a, a, 3) < 0.8; }, this->two_decades);
   std::normal_distribution<double> normal;
   for (TypeParam& b : lattice.b) b = static_cast<TypeParam>(normal(this->generator_));
-  Solver<TypeParam> once(lattice), shuffling(lattice, {shuffled, &this->generator_}), twice(lattice);
+  Solver<TypeParam> once(lattice), shuffling(lattice, {chunks_shuffled, &this->generator_}), twice(lattice);
   once.solve(1e-6), shuffling.solve(1e-6);
   for (TypeParam& b : lattice.b) b = -b;
   std::copy(lattice.b.begin(), lattice.b.end(), twice.pressure.right.data());

@@ -12,8 +12,10 @@
 
 #include "kernels/hairmesh/hair_mesh_solver.h"
 #include "kernels/strand/strand_batch.h"
+#include "pipeline/frame_times.h"
 #include "pipeline/simulation.h"
 #include "scene/scene.h"
+#include "unit/pipeline_support.h"
 
 namespace ringlet::pipeline {
 namespace {
@@ -42,13 +44,6 @@ constexpr const char* kHairMesh = R"({
   "groom": {"hair_mesh": {"file": "mesh.json", "strands": 9, "particles": 7}, "attach": "fixed"},
   "model": {"type": "hair_mesh", "substeps": 2}, "effects": {"gravity": [0, -9.81, 0]}})";
 
-class Discard : public state::FrameSink {
- public:
-  void write(state::Frame, state::Snapshot, double) override { ++frames; }
-  void finish() override {}
-  int frames = 0;
-};
-
 // Where a value of a strand lies in an array of its kind, and how wide a value is.
 struct Place {
   const char* array;
@@ -69,7 +64,7 @@ class PipelineHealth : public testing::Test {
  protected:
   PipelineHealth() {
     std::filesystem::create_directories(folder_);
-    write_hair();
+    pipeline_testing::write_hair(folder_ / "hair.data", kStrands, kParticles);
     std::ofstream(folder_ / "solid.obj")
         << "v 0 -1 0\nv 0.1 -1 0\nv 0 -0.9 0\nv 0 -1 0.1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
     std::ofstream(folder_ / "mesh.json") << R"({"format": "ringlet-hair-mesh", "version": 1,
@@ -78,16 +73,6 @@ class PipelineHealth : public testing::Test {
                  [[0,0.1,0],[0,0.1,0.1],[0.1,0.1,0.1],[0.1,0.1,0]]]})";
   }
   ~PipelineHealth() override { std::filesystem::remove_all(folder_); }
-
-  void write_hair() const {
-    std::ofstream file(folder_ / "hair.data", std::ios::binary);
-    const auto put = [&](auto value) { file.write(reinterpret_cast<const char*>(&value), sizeof value); };
-    put(std::int32_t{kStrands});
-    for (int s = 0; s < kStrands; ++s) {
-      put(std::int32_t{kParticles});
-      for (int i = 0; i < kParticles; ++i) put(0.002f * s), put(0.02f * i), put(0.001f * (i * s % 3));
-    }
-  }
 
   std::unique_ptr<Simulation> simulation(const char* text, Precision precision) const {
     std::ofstream(folder_ / "scene.json") << text;
@@ -101,7 +86,7 @@ class PipelineHealth : public testing::Test {
   template <class Poison>
   Diverged run_poisoned(const char* text, Precision precision, const std::string& stage, int frame,
                         int substep, const Poison& poison) const {
-    Discard sink;
+    DiscardFrames sink;
     RunControl control;
     bool poisoned = false;
     control.probe = [&](const std::string& after, int in_frame, int in_substep, state::Snapshot& arrays) {
@@ -244,7 +229,7 @@ TEST_F(PipelineHealth, OfACheckpoint) {
     control.resume = kept.last;
     for (const Place& place : kPlaces)
       if (std::string(place.array) == array) put<float>(*control.resume, place, kNaN);
-    Discard sink;
+    DiscardFrames sink;
     try {
       simulation(kAll, Precision::kFloat)->run({1, 3}, sink, control);
       ADD_FAILURE() << "nothing was found";

@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <cstdlib>
+#include <fstream>
 #include <new>
 
 namespace {
@@ -27,5 +28,17 @@ void operator delete(void* memory, std::size_t) noexcept { release(memory); }
 namespace ringlet::pipeline_testing {
 
 std::int64_t allocated() { return sum; }
+
+void write_hair(const std::filesystem::path& to, std::int32_t strands, std::int32_t particles) {
+  std::ofstream file(to, std::ios::binary);
+  const auto put = [&](auto value) { file.write(reinterpret_cast<const char*>(&value), sizeof value); };
+  put(strands);
+  for (std::int32_t s = 0; s < strands; ++s) {
+    put(particles);
+    for (std::int32_t i = 0; i < particles; ++i)
+      put(0.002f * static_cast<float>(s)), put(0.02f * static_cast<float>(i)),
+          put(0.001f * static_cast<float>(i * s % 3));
+  }
+}
 
 }  // namespace ringlet::pipeline_testing

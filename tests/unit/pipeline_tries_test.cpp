@@ -7,6 +7,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "pipeline/frame_times.h"
 #include "pipeline/simulation.h"
 #include "scene/scene.h"
 #include "unit/pipeline_support.h"
@@ -15,12 +16,6 @@ namespace ringlet::pipeline {
 namespace {
 
 using nlohmann::json;
-
-class Discard : public state::FrameSink {
- public:
-  void write(state::Frame, state::Snapshot, double) override {}
-  void finish() override {}
-};
 
 // While a frame's last try, of four substeps, takes its last one.
 struct Held {
@@ -36,16 +31,6 @@ class PipelineTries : public testing::Test {
   ~PipelineTries() override { std::filesystem::remove_all(folder_); }
 
   void write(const char* name, const json& text) const { std::ofstream(folder_ / name) << text; }
-
-  void write_hair(int strands, int particles) const {
-    std::ofstream file(folder_ / "hair.data", std::ios::binary);
-    const auto put = [&](auto value) { file.write(reinterpret_cast<const char*>(&value), sizeof value); };
-    put(std::int32_t{strands});
-    for (int s = 0; s < strands; ++s) {
-      put(std::int32_t{particles});
-      for (int i = 0; i < particles; ++i) put(0.002f * s), put(0.02f * i), put(0.001f * (i * s % 3));
-    }
-  }
 
   // A slab of `across` by `across` quads.
   void write_mesh(int across, int layers) const {
@@ -79,7 +64,7 @@ class PipelineTries : public testing::Test {
     const auto simulation = Simulation::create(loaded, options);
     for (const PlannedStage& stage : simulation->plan().stages)
       if (stage.name == kTries) held.planned = stage.bytes;
-    Discard sink;
+    DiscardFrames sink;
     RunControl control;
     control.probe = [&](const std::string&, int, int substep, state::Snapshot& arrays) {
       if (substep != 3 || held.allocated != 0) return;
@@ -108,7 +93,7 @@ void expect_planned(const Held& chosen, std::int64_t expected) {
 // The state is allocated beside `new`, by the threads' own allocator: its copy is as large as it is. What the
 // last try leads to comes on top, at its end.
 TEST_F(PipelineTries, OfStrandsHoldWhatThePlanSays) {
-  write_hair(1500, 6);
+  pipeline_testing::write_hair(folder_ / "hair.data", 1500, 6);
   const json plain = {{"name", "strands"},
                       {"frames", {{"last", 2}}},
                       {"groom", {{"file", "hair.data"}, {"attach", "fixed"}}},

@@ -26,6 +26,12 @@ struct LaneFigures {
 // is a polyline of chords. What is deeper is a thin part of the solid between two particles.
 inline constexpr float kChordVoxels = 0.25f;
 
+// Where a particle touches a solid: the surface's normal, outwards, and velocity [m/s], world axes.
+template <class T>
+struct Touch {
+  Vector3<T> normal, velocity;
+};
+
 template <class T>
 struct StrandContact {
   const SolidView& solid;
@@ -93,17 +99,20 @@ struct StrandContact {
            (solid.blend > 0.0f && distance_to_bounds(solid.level_set[1], root) <= reach);
   }
 
+  RINGLET_FUNCTION Touch<T> touch(const SurfaceSample<T>& at) const {
+    return {world_normal(at), (T(1) / step) * surface_displacement(solid, at)};
+  }
+
   // The velocity stage at a sample inside the solid.
-  RINGLET_FUNCTION Vector3<T> respond(const SurfaceSample<T>& at, Vector3<T> normal, Vector3<T> v) const {
-    const Vector3<T> solid_velocity = (T(1) / step) * surface_displacement(solid, at);
-    const Vector3<T> u = v - solid_velocity;
+  RINGLET_FUNCTION Vector3<T> respond(const Touch<T>& touch, Vector3<T> v) const {
+    const Vector3<T> normal = touch.normal, u = v - touch.velocity;
     const T along = dot(u, normal);
     if (along > T(0)) return v;  // separating
     const Vector3<T> tangential = fma(-along, normal, u);
     const T slip = length(tangential);
     const T keep =
         max(T(0), fma(static_cast<T>(solid.friction) * along, inverse_or_zero(slip, T(1e-12)), T(1)));
-    return fma(keep, tangential, solid_velocity);
+    return fma(keep, tangential, touch.velocity);
   }
 
   // The particle's way over the substep as the solid sees it, level-set axes [m]. A surface that deforms
@@ -172,24 +181,24 @@ RINGLET_FUNCTION Entry<T> hidden_entry(const StrandContact<T>& contact, Vector3<
 // outside the solid it is at least [m].
 template <class T>
 RINGLET_FUNCTION bool collide_particle(const StrandContact<T>& contact, Vector3<T>& x, Vector3<T>& v,
-                                       Vector3<T>& normal, T& clearance, LaneFigures<T>& figures) {
+                                       Touch<T>& touch, T& clearance, LaneFigures<T>& figures) {
   SurfaceSample<T> at = contact.sample(x);
   clearance = max(T(0), at.distance);
   const Entry<T> entry = contact.slack > T(0) ? Entry<T>{} : hidden_entry(contact, x, v, at, figures);
   if (entry.found) at = contact.sample(entry.x);
   if (!at.exact || !(entry.found || at.distance < T(0))) return false;
   clearance = T(0);
-  normal = contact.world_normal(at);
-  const Vector3<T> changed = contact.respond(at, normal, v);
+  touch = contact.touch(at);
+  const Vector3<T> changed = contact.respond(touch, v);
   if (entry.found)
-    x = entry.x + entry.left * (contact.step * changed - surface_displacement(contact.solid, at));
+    x = entry.x + entry.left * contact.step * (changed - touch.velocity);
   else
     x = fma(contact.step, changed - v, x);
   v = changed;
   at = contact.sample(x);
   if (at.distance < T(0) && at.exact) {
-    normal = contact.world_normal(at);
-    x = fma(-at.distance, normal, x);
+    touch = contact.touch(at);
+    x = fma(-at.distance, touch.normal, x);
   }
   return true;
 }

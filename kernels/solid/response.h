@@ -50,8 +50,8 @@ struct ContactStep {
 
 inline namespace RINGLET_ISA {
 
-// Position, velocity, normal, clearance, projection.
-inline constexpr int kContactReals = 3 + 3 + 3 + 1 + kProjectionReals;
+// Position, velocity, normal, the surface's velocity, clearance, projection.
+inline constexpr int kContactReals = 3 + 3 + 3 + 3 + 1 + kProjectionReals;
 
 // Push-outs under this [m] do not ask for another round.
 template <class T>
@@ -69,7 +69,8 @@ RINGLET_FUNCTION T far_inside() {
 template <class R>
 struct ContactPack {
   using T = Scalar<R>;
-  T *position, *velocity, *normal;
+  T *position, *velocity;
+  T *normal, *surface_velocity;  // where the particle has touched last
   T* clearance;  // [particles] of the solid at hand: how far outside it the particle is at least
   T* projection;
   int stride;
@@ -81,6 +82,9 @@ struct ContactPack {
   RINGLET_FUNCTION void set(T* array, int particle, int lane, Vector3<T> a) const {
     T* p = array + 3 * particle * stride + lane;
     p[0] = a.x, p[stride] = a.y, p[2 * stride] = a.z;
+  }
+  RINGLET_FUNCTION void set_touch(int particle, int lane, const Touch<T>& touch) const {
+    set(normal, particle, lane, touch.normal), set(surface_velocity, particle, lane, touch.velocity);
   }
 };
 
@@ -153,11 +157,12 @@ struct ContactLane {
       begin(contact);
       for (int i = first(); i < count; ++i) {
         go_to(contact, i);
-        Vector3<T> x = pack.get(pack.position, i, in_pack), v = pack.get(pack.velocity, i, in_pack), n;
-        if (!collide_particle(contact, x, v, n, clearance(i), figures)) continue;
+        Vector3<T> x = position(i), v = pack.get(pack.velocity, i, in_pack);
+        Touch<T> touch;
+        if (!collide_particle(contact, x, v, touch, clearance(i), figures)) continue;
         figures.touched = true;
-        pack.set(pack.position, i, in_pack, x), pack.set(pack.velocity, i, in_pack, v),
-            pack.set(pack.normal, i, in_pack, n);
+        pack.set(pack.position, i, in_pack, x), pack.set(pack.velocity, i, in_pack, v);
+        pack.set_touch(i, in_pack, touch);
       }
       push_segments(contact, figures);
     });
@@ -205,13 +210,13 @@ struct ContactLane {
   RINGLET_FUNCTION T& clearance(int i) const { return pack.clearance[i * pack.stride + in_pack]; }
   RINGLET_FUNCTION Vector3<T> position(int i) const { return pack.get(pack.position, i, in_pack); }
 
-  // Out of the solid, without a change of the particle's own velocity; notes the normal.
+  // Out of the solid, without a change of the particle's own velocity; notes the touch.
   RINGLET_FUNCTION void push_particle(const StrandContact<T>& contact, int i, const SurfaceSample<T>& at,
                                       LaneFigures<T>& figures) const {
     if (!(at.distance < T(0)) || !at.exact) return;
-    const Vector3<T> n = contact.world_normal(at);
-    pack.set(pack.position, i, in_pack, fma(-at.distance, n, position(i)));
-    pack.set(pack.normal, i, in_pack, n);
+    const Touch<T> touch = contact.touch(at);
+    pack.set(pack.position, i, in_pack, fma(-at.distance, touch.normal, position(i)));
+    pack.set_touch(i, in_pack, touch);
     figures.touched = true;
     figures.pushed = max(figures.pushed, -at.distance);
   }
@@ -232,17 +237,17 @@ struct ContactLane {
         const SurfaceSample<T> at = contact.sample_inside(fma(t, b - a, a));
         const T depth = T(0) - at.distance - allowed;
         if (!(depth > T(0)) || !at.exact) continue;
-        const Vector3<T> n = contact.world_normal(at);
+        const Touch<T> touch = contact.touch(at);
         const T share = T(1) / fma(T(1) - t, T(1) - t, t * t);
-        a = fma((T(1) - t) * share * depth, n, a), b = fma(t * share * depth, n, b);
+        a = fma((T(1) - t) * share * depth, touch.normal, a), b = fma(t * share * depth, touch.normal, b);
         // The sample's velocity responds as a particle's: left alone it would come back faster every time.
         const Vector3<T> va = pack.get(pack.velocity, i, in_pack),
                          vb = pack.get(pack.velocity, i + 1, in_pack);
-        const Vector3<T> v = fma(t, vb - va, va), changed = contact.respond(at, n, v) - v;
+        const Vector3<T> v = fma(t, vb - va, va), changed = contact.respond(touch, v) - v;
         pack.set(pack.velocity, i, in_pack, fma((T(1) - t) * share, changed, va));
         pack.set(pack.velocity, i + 1, in_pack, fma(t * share, changed, vb));
-        pack.set(pack.position, i, in_pack, a), pack.set(pack.normal, i, in_pack, n);
-        pack.set(pack.position, i + 1, in_pack, b), pack.set(pack.normal, i + 1, in_pack, n);
+        pack.set(pack.position, i, in_pack, a), pack.set_touch(i, in_pack, touch);
+        pack.set(pack.position, i + 1, in_pack, b), pack.set_touch(i + 1, in_pack, touch);
         figures.touched = true;
         figures.pushed = max(figures.pushed, depth);
       }
@@ -282,7 +287,8 @@ struct PackContacts {
              scratch + 3 * particles * stride,
              scratch + 6 * particles * stride,
              scratch + 9 * particles * stride,
-             scratch + 10 * particles * stride,
+             scratch + 12 * particles * stride,
+             scratch + 13 * particles * stride,
              stride},
         lengths{pack.position,
                 pack.velocity,
@@ -298,7 +304,7 @@ struct PackContacts {
     for (int k = 0; k < 3 * particles; ++k) {
       store(pack.position + k * stride, load<R>(x + k * kLanes));
       store(pack.velocity + k * stride, load<R>(v + k * kLanes));
-      store(pack.normal + k * stride, R(0));
+      store(pack.normal + k * stride, R(0)), store(pack.surface_velocity + k * stride, R(0));
     }
   }
 
@@ -373,20 +379,22 @@ struct PackContacts {
     write_back(load<R>(better) > R(0), x, pack.position);
   }
 
-  // No particle is faster than it has moved. A push out of the solid is no motion, but lengths that pull back
-  // what was pushed take that for one: what a solid presses would lie still at a speed. Where lengths make up
-  // for several substeps, how far this one has led is not known.
+  // No particle is faster against the surface that it touches than it has moved against it. A push out of the
+  // solid is no motion, but lengths that pull back what was pushed take that for one: what a solid presses
+  // would lie still at a speed. Where lengths make up for several substeps, how far this one has led is not
+  // known.
   RINGLET_FUNCTION void limit_velocities() {
     if (step.skipped_substeps > 0) return;
-    for (int l = 0; l < kWidth; ++l) left[l] = figures[l].touched ? T(1) : T(0);
-    const Mask<R> touched = load<R>(left) > R(0);
     for (int i = 0; i < particles; ++i) {
-      const Vector3<R> before = load3<R>(x + 3 * i * kLanes, kLanes),
-                       after = load3<R>(pack.position + 3 * i * pack.stride, pack.stride),
-                       moved = load3<R>(v + 3 * i * kLanes, kLanes) + lengths.per_h * (after - before);
-      T* to = pack.velocity + 3 * i * pack.stride;
-      const Vector3<R> own = load3<R>(to, pack.stride);
-      store3<R>(to, pack.stride, select(touched & (dot(moved, moved) < dot(own, own)), moved, own));
+      const int at = 3 * i * pack.stride;
+      const Vector3<R> surface = load3<R>(pack.surface_velocity + at, pack.stride),
+                       own = load3<R>(pack.velocity + at, pack.stride),
+                       way = load3<R>(pack.position + at, pack.stride) - load3<R>(x + 3 * i * kLanes, kLanes),
+                       moved = fma(lengths.per_h, way, load3<R>(v + 3 * i * kLanes, kLanes));
+      const Vector3<R> slip = own - surface, moved_slip = moved - surface;
+      // Where nothing has pushed they differ by rounding alone.
+      const Mask<R> faster = dot(moved_slip, moved_slip) < dot(slip, slip);
+      store3<R>(pack.velocity + at, pack.stride, select(faster, moved, own));
     }
   }
 

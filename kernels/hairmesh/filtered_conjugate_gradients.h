@@ -38,24 +38,19 @@ class FilteredConjugateGradients {
   template <class Matrix>
   SolveFigures solve(const Matrix& a, const VertexFilter<T>& filter, T tolerance, std::int32_t iterations,
                      const Padded<T>* b, Padded<T>* x) {
-    Padded<T>* r = vectors(left_);
-    SolveFigures figures;
     for_rows(a, [&](std::int32_t i) {
       x[i] = Padded<T>{}, vectors(product_)[i] = Padded<T>{};
-      r[i] = filter.keep(i, b[i]);
+      vectors(left_)[i] = filter.keep(i, b[i]);
     });
-    const T first = weighted_square(a, r), goal = tolerance * tolerance * first;
-    T left = first, last = T(8) * first;
-    // Rounding ends what goes on for too long.
-    while (left > goal && left < T(0.25) * last && figures.iterations < iterations) {
-      last = left;
-      iterate(a, filter, goal, left, iterations, r, x, figures);
-      multiply(a, x, vectors(product_));
-      for_rows(a, [&](std::int32_t i) { r[i] = filter.keep(i, b[i] - vectors(product_)[i]); });
-      left = weighted_square(a, r);
-    }
-    figures.residual = static_cast<double>(first > 0 ? sqrt(left / first) : first);
-    return figures;
+    first_ = weighted_square(a, vectors(left_));
+    return reduce(a, filter, tolerance, iterations, b, x, first_);
+  }
+  // The same from an x that is near, and has values where they are prescribed; to a residual relative to that
+  // at the start of the last `solve`.
+  template <class Matrix>
+  SolveFigures solve_on(const Matrix& a, const VertexFilter<T>& filter, T tolerance, std::int32_t iterations,
+                        const Padded<T>* b, Padded<T>* x) {
+    return reduce(a, filter, tolerance, iterations, b, x, true_residual(a, filter, b, x));
   }
 
   // A x of the last solve, also where it is prescribed.
@@ -77,6 +72,31 @@ class FilteredConjugateGradients {
   static RINGLET_KERNEL void for_rows(const Matrix& a, const F& f) {
     for (std::int32_t c = 0; c < a.columns(); ++c)
       for (std::int32_t i = a.first_row(c); i < a.end_row(c); ++i) f(i);
+  }
+
+  // Until the weighted square of the residual, `left` at the start, is small enough.
+  template <class Matrix>
+  SolveFigures reduce(const Matrix& a, const VertexFilter<T>& filter, T tolerance, std::int32_t iterations,
+                      const Padded<T>* b, Padded<T>* x, T left) {
+    SolveFigures figures;
+    const T goal = tolerance * tolerance * first_;
+    T last = T(8) * left;
+    // Rounding ends what goes on for too long.
+    while (left > goal && left < T(0.25) * last && figures.iterations < iterations) {
+      last = left;
+      iterate(a, filter, goal, left, iterations, vectors(left_), x, figures);
+      left = true_residual(a, filter, b, x);
+    }
+    figures.residual = static_cast<double>(first_ > 0 ? sqrt(left / first_) : first_);
+    return figures;
+  }
+  // S (b - A x) in left_; its weighted square.
+  template <class Matrix>
+  T true_residual(const Matrix& a, const VertexFilter<T>& filter, const Padded<T>* b, const Padded<T>* x) {
+    Padded<T>*r = vectors(left_), *product = vectors(product_);
+    multiply(a, x, product);
+    for_rows(a, [&](std::int32_t i) { r[i] = filter.keep(i, b[i] - product[i]); });
+    return weighted_square(a, r);
   }
 
   // Adds to x until the weighted square of the residual, `left` for `b` at the start, is down to `goal`. What
@@ -191,6 +211,7 @@ class FilteredConjugateGradients {
   HostBuffer<T> residual_, scaled_, direction_;  // r, z, p
   HostBuffer<T> back_, later_, earlier_;
   HostBuffer<T> product_, left_;
+  T first_ = 0;  // weighted square of the residual at the start of the last solve
 };
 
 }  // namespace RINGLET_ISA

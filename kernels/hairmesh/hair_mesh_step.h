@@ -99,9 +99,13 @@ class MeshStepper final : public HairMeshSolver<T> {
   }
 
   SolveFigures solve() override {
-    SolveFigures figures = solve_held();
+    hold();
+    SolveFigures figures =
+        gradients_.solve(matrix_, filter_, tolerance_, iterations_, vectors(impulse_), vectors(change_));
     for (int round = 0; round < kMostRounds && stop_turned(); ++round) {
-      const SolveFigures more = solve_held();
+      hold();
+      const SolveFigures more =
+          gradients_.solve_on(matrix_, filter_, tolerance_, iterations_, vectors(impulse_), vectors(change_));
       figures.iterations += more.iterations;
       if (!(more.residual <= figures.residual)) figures.residual = more.residual;
     }
@@ -253,8 +257,8 @@ class MeshStepper final : public HairMeshSolver<T> {
     }
   }
 
-  // The change of velocity that the system makes of what contacts leave free.
-  SolveFigures solve_held() {
+  // Prescribes what contacts hold.
+  void hold() {
     filter_.clear();
     for (std::int32_t k = 0; k < contact_count_; ++k) {
       const MeshContact<T>& contact = contacts_.data()[k];
@@ -264,12 +268,11 @@ class MeshStepper final : public HairMeshSolver<T> {
         filter_.prescribe_along(contact.vertex, padded(contact.normal));
     }
     matrix_.factor(filter_);
-    return gradients_.solve(matrix_, filter_, tolerance_, iterations_, vectors(impulse_), vectors(change_));
   }
 
   // What slides is stopped where friction would turn its motion: it sticks from the step's start, and the
-  // rest is to be solved anew. Stopped after the solve it would leave the rest where hair that slid on would
-  // have taken it, which then jerks at what sticks, and hair that chatters so never comes to rest.
+  // solve is to go on with the rest. Stopped after the solve it would leave the rest where hair that slid on
+  // would have taken it, which then jerks at what sticks, and hair that chatters so never comes to rest.
   bool stop_turned() {
     std::int32_t* turned = turned_.data();
     std::int32_t count = 0;
@@ -280,20 +283,13 @@ class MeshStepper final : public HairMeshSolver<T> {
           velocity()[contact.vertex] + vectors(change_)[contact.vertex] - padded(contact.velocity);
       if (turns(relative, contact)) turned[count++] = k;
     }
-    if (count == 0) return false;
-    Padded<T>*stop = vectors(change_), *taken = vectors(before_);
-    for (std::int32_t i = 0; i < vertices_; ++i) stop[i] = Padded<T>{};
-    for (; count > 0; --count) {
-      MeshContact<T>& contact = contacts_.data()[turned[count - 1]];
-      const std::int32_t i = contact.vertex;
+    for (std::int32_t k = 0; k < count; ++k) {
+      MeshContact<T>& contact = contacts_.data()[turned[k]];
       contact.sticks = 1;
-      stop[i] = padded(contact.velocity) - velocity()[i];
-      velocity()[i] += stop[i];
-      vectors(impulse_)[i] -= step_ * padded(contact.force);
+      vectors(change_)[contact.vertex] = padded(contact.velocity) - velocity()[contact.vertex];
+      vectors(impulse_)[contact.vertex] -= step_ * padded(contact.force);
     }
-    gradients_.multiply(matrix_, stop, taken);
-    for (std::int32_t i = 0; i < vertices_; ++i) vectors(impulse_)[i] -= taken[i];
-    return true;
+    return count > 0;
   }
 
   // What holding a vertex took, as an impulse, with that of `prescribe`. One that had to be held back, which

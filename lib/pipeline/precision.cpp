@@ -28,4 +28,14 @@ void refuse_stiff_in_float(const scene::Scene& scene, std::span<const float> sca
                   "run it with --precision double, or make it softer: hair keeps its length by inextensible");
 }
 
+void refuse_fine_lengths_in_float(const scene::Scene& scene, std::int32_t particles) {
+  const double finest = kFinestStrainInFloat * (particles - 1);
+  if (!scene.effects.inextensible || scene.effects.inextensible->tolerance >= finest) return;
+  throw Error(
+      ErrorKind::kInput, fmt::format("{}#/effects/inextensible/tolerance", scene.file.string()),
+      fmt::format("is {:.3g}, expected at least {:.2g} in single precision for strands of {} particles",
+                  scene.effects.inextensible->tolerance, finest, particles),
+      "run it with --precision double, or allow more strain");
+}
+
 }  // namespace ringlet::pipeline

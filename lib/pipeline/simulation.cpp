@@ -56,10 +56,14 @@ std::vector<float> radii(const scene::Scene& scene, const groom::Strands& strand
 
 template <class T>
 state::StrandInput strand_input(const scene::Scene& scene, const World& world) {
-  if constexpr (sizeof(T) == sizeof(float)) refuse_stiff_in_float(scene, world.stiffness);
   state::StrandInput input;
   const groom::Strands& strands = world.simulated.strands;
   for (std::size_t s = 0; s < strands.size(); ++s) input.counts.push_back(strands.count(s));
+  if constexpr (sizeof(T) == sizeof(float)) {
+    refuse_stiff_in_float(scene, world.stiffness);
+    if (!input.counts.empty())
+      refuse_fine_lengths_in_float(scene, *std::max_element(input.counts.begin(), input.counts.end()));
+  }
   input.living = world.living;
   input.rest = strands.points;
   input.stiffness = world.stiffness;

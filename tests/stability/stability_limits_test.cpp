@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "pipeline/precision.h"
 #include "stability/suite.h"
 
 namespace ringlet::stability {
@@ -45,6 +46,42 @@ TEST(TooStiffByCurve, IsRefusedInSinglePrecision) {
   scenario.set.push_back("/model/stiffness/bend=5e5");
   EXPECT_EQ(run(scenario).diverged, "");
 }
+
+// What float holds of lengths: at the finest that it may be asked for strands stay at that, below it runs are
+// refused.
+class FineLengths : public testing::TestWithParam<std::tuple<Model, int>> {};
+
+TEST_P(FineLengths, AreHeldOrRefusedInSinglePrecision) {
+  const auto& [model, particles] = GetParam();
+  const double finest = pipeline::kFinestStrainInFloat * (particles - 1);
+  Scenario scenario{
+      .model = model, .machine = Machine::kFloat, .hair = few_strands(0.2, particles), .seconds = 0.5};
+  const auto ask = [&](double tolerance) {
+    scenario.set = {fmt::format("/effects/inextensible={{\"tolerance\": {}}}", tolerance)};
+  };
+  ask(1.01 * finest);
+  const Outcome outcome = run(scenario);
+  EXPECT_EQ(outcome.diverged, "");
+  EXPECT_LE(outcome.strain, 1.01 * finest);
+  ask(0.99 * finest);
+  try {
+    run(scenario);
+    FAIL() << "the run was not refused";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::kInput);
+    EXPECT_THAT(error.what(), HasSubstr("/effects/inextensible/tolerance"));
+    EXPECT_THAT(error.what(), HasSubstr("--precision double"));
+  }
+  scenario.machine = Machine::kDouble;
+  EXPECT_LE(run(scenario).strain, 0.99 * finest);
+}
+
+INSTANTIATE_TEST_SUITE_P(Lengths, FineLengths,
+                         testing::Combine(testing::ValuesIn(kStrandModels), testing::Values(16, 100, 500)),
+                         [](const auto& info) {
+                           return fmt::format("{}_{}_particles", name_of(std::get<0>(info.param)),
+                                              std::get<1>(info.param));
+                         });
 
 // The papers' scheme without its mends, shaken: it stays within the limits or says where it left them.
 class Papers : public testing::TestWithParam<std::tuple<Model, Machine, int, int>> {};

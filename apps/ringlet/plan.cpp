@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <iterator>
 #include <nlohmann/json.hpp>
+#include <string>
 
 #include "scene/scene.h"
 
@@ -36,13 +38,22 @@ std::string range(N least, N most) {
   return least == most ? fmt::format("{}", most) : fmt::format("{} to {}", least, most);
 }
 
+// With three digits, in the largest unit that leaves a whole part.
+std::string size(std::size_t bytes) {
+  double value = static_cast<double>(bytes);
+  const char* const units[] = {"B", "kB", "MB", "GB", "TB"};
+  std::size_t unit = 0;
+  for (; value >= 999.5 && unit + 1 < std::size(units); ++unit) value *= 1e-3;
+  return fmt::format("{:.3g} {}", value, units[unit]);
+}
+
 void print_table(const scene::Scene& scene, const pipeline::Plan& plan) {
   fmt::print("scene {}: {} strands, {} particles, {} frames of {} substeps\n", scene.name, plan.strands,
              plan.particles, plan.frames, range(plan.least_substeps, plan.substeps));
-  fmt::print("  {:<13} {:>10} {:>16}  {}\n", "stage", "MB", "launches", "what");
+  fmt::print("  {:<13} {:>10} {:>16}  {}\n", "stage", "memory", "launches", "what");
   for (const pipeline::PlannedStage& stage : plan.stages) {
     if (stage.runs)
-      fmt::print("  {:<13} {:>10.1f} {:>16}  {}\n", stage.name, 1e-6 * static_cast<double>(stage.bytes),
+      fmt::print("  {:<13} {:>10} {:>16}  {}\n", stage.name, size(stage.bytes),
                  range(stage.launches.least, stage.launches.most), stage.what);
     else
       fmt::print("  {:<13} {:>10} {:>16}  {}\n", stage.name, "-", "-", "not in this scene");

@@ -275,6 +275,11 @@ class Page {
           order(orders.rms), cell(level.largest, "{:.2e}"), order(orders.largest), level.iterations);
     }
     say("");
+    for (const PressureLevel& level : study_.pressure)
+      if (!(level.residual <= kPressureResidual))
+        say("**With {} cells across the solver stopped at a residual of {:.1e}**: the error there, and the "
+            "orders that it enters, hold what is left.\n",
+            level.edge, level.residual);
   }
 
   void notes() {

@@ -205,6 +205,15 @@ def test_an_absent_effect_has_no_stage_and_no_bytes(program, scene):
     assert (whole["strands"], whole["particles"]) == (STRANDS, STRANDS * PARTICLES)
 
 
+def test_the_plan_names_sizes_in_the_unit_that_shows_them(program, scene):
+    sizes = {stage["name"]: stage["bytes"] for stage in plan(program, scene)["stages"]}
+    units = {"B": 1, "kB": 1e3, "MB": 1e6, "GB": 1e9}
+    shown = re.findall(r"^ +(\w+) +([0-9.]+) (B|kB|MB|GB) +\d+ ", run(program, "plan", scene).stdout, re.MULTILINE)
+    assert {name for name, _, _ in shown} == set(sizes)
+    for name, value, unit in shown:
+        assert float(value) * units[unit] == pytest.approx(sizes[name], rel=0.005) and 1 <= float(value) < 1000
+
+
 def test_a_still_head_moves_no_roots(program, scene):
     roots = plan(program, scene, "--set", "/head/animation=null")["stages"][0]
     assert roots["name"] == "roots" and roots["launches"] == 0

@@ -194,6 +194,13 @@ def test_of_a_scene_with_a_grid_the_pressures_order_is_measured(program, scene, 
     assert re.findall(r"^pressure: (\d+) cells", again.stdout, re.MULTILINE) == ["64"]
     assert json.loads((out / "study.json").read_text())["pressure"] == told
 
+    # A level that was not solved so far is marked.
+    assert "stopped at a residual" not in (out / "report.md").read_text()
+    told["levels"][3]["residual"] = 1e-9
+    (out / "study.json").write_text(json.dumps({**cut, "pressure": told}))
+    assert run(program, "study", scene, "-o", out, "--resume", *SHORT, "--set", GRID).returncode == 0
+    assert "**With 64 cells across the solver stopped at a residual of 1.0e-09**" in (out / "report.md").read_text()
+
 
 def test_without_a_grid_there_is_no_pressure(substeps):
     out, told, _ = substeps

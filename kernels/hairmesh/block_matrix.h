@@ -64,30 +64,31 @@ class BlockMatrix {
   // Factors D, with the filter S on both of its sides, as D = (I + N) E (I + N^T): E block diagonal, N the
   // two blocks below it in each column.
   void factor(const VertexFilter<T>& filter) {
-    for (std::int32_t column = 0; column < columns_; ++column) {
-      const std::int32_t begin = first_row(column), end = end_row(column);
-      const bool filtered = filter.touches(column);
-      Padded<T> once[3]{}, twice[3]{},
-          far[3]{};  // blocks (i - 1, i), (i - 1, i + 1) and (i - 2, i) of E (I + N^T)
-      for (std::int32_t i = begin; i < end; ++i) {
-        Padded<T> self[3], next[3], after[3], up[3];
-        load(own(i, 0), self), load(own(i, 1), next), load(own(i, 2), after);
-        if (filtered) {
-          filter.keep(i, i, self);
-          if (i + 1 < end) filter.keep(i, i + 1, next);
-          if (i + 2 < end) filter.keep(i, i + 2, after);
-        }
-        if (i > begin) {
-          divide(i - 1, once, up), store(factor_of(i, kOnce), up);
-          subtract_product(self, up, once), subtract_product(next, up, twice);
-        }
-        if (i > begin + 1) {
-          divide(i - 2, far, up), store(factor_of(i, kTwice), up);
-          subtract_product(self, up, far);
-        }
-        invert(self, up), store(factor_of(i, kInverse), up);
-        for (int k = 0; k < 3; ++k) far[k] = twice[k], once[k] = next[k], twice[k] = after[k];
+    for (std::int32_t column = 0; column < columns_; ++column) factor_column(column, filter);
+  }
+  void factor_column(std::int32_t column, const VertexFilter<T>& filter) {
+    const std::int32_t begin = first_row(column), end = end_row(column);
+    const bool filtered = filter.touches(column);
+    Padded<T> once[3]{}, twice[3]{},
+        far[3]{};  // blocks (i - 1, i), (i - 1, i + 1) and (i - 2, i) of E (I + N^T)
+    for (std::int32_t i = begin; i < end; ++i) {
+      Padded<T> self[3], next[3], after[3], up[3];
+      load(own(i, 0), self), load(own(i, 1), next), load(own(i, 2), after);
+      if (filtered) {
+        filter.keep(i, i, self);
+        if (i + 1 < end) filter.keep(i, i + 1, next);
+        if (i + 2 < end) filter.keep(i, i + 2, after);
       }
+      if (i > begin) {
+        divide(i - 1, once, up), store(factor_of(i, kOnce), up);
+        subtract_product(self, up, once), subtract_product(next, up, twice);
+      }
+      if (i > begin + 1) {
+        divide(i - 2, far, up), store(factor_of(i, kTwice), up);
+        subtract_product(self, up, far);
+      }
+      invert(self, up), store(factor_of(i, kInverse), up);
+      for (int k = 0; k < 3; ++k) far[k] = twice[k], once[k] = next[k], twice[k] = after[k];
     }
   }
 

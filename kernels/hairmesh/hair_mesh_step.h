@@ -103,7 +103,6 @@ class MeshStepper final : public HairMeshSolver<T> {
     SolveFigures figures =
         gradients_.solve(matrix_, filter_, tolerance_, iterations_, vectors(impulse_), vectors(change_));
     for (int round = 0; round < kMostRounds && stop_turned(); ++round) {
-      hold();
       const SolveFigures more =
           gradients_.solve_on(matrix_, filter_, tolerance_, iterations_, vectors(impulse_), vectors(change_));
       figures.iterations += more.iterations;
@@ -286,6 +285,8 @@ class MeshStepper final : public HairMeshSolver<T> {
     for (std::int32_t k = 0; k < count; ++k) {
       MeshContact<T>& contact = contacts_.data()[turned[k]];
       contact.sticks = 1;
+      filter_.prescribe_wholly(contact.vertex);
+      matrix_.factor_column(contact.vertex / layers_, filter_);
       vectors(change_)[contact.vertex] = padded(contact.velocity) - velocity()[contact.vertex];
       vectors(impulse_)[contact.vertex] -= step_ * padded(contact.force);
     }

@@ -46,11 +46,13 @@ class FilteredConjugateGradients {
     return reduce(a, filter, tolerance, iterations, b, x, first_);
   }
   // The same from an x that is near, and has values where they are prescribed; to a residual relative to that
-  // at the start of the last `solve`.
+  // at the start of the last `solve`, or here where it is larger.
   template <class Matrix>
   SolveFigures solve_on(const Matrix& a, const VertexFilter<T>& filter, T tolerance, std::int32_t iterations,
                         const Padded<T>* b, Padded<T>* x) {
-    return reduce(a, filter, tolerance, iterations, b, x, true_residual(a, filter, b, x));
+    const T left = true_residual(a, filter, b, x);
+    first_ = max(first_, left);  // what nothing moved at the start, the new values may
+    return reduce(a, filter, tolerance, iterations, b, x, left);
   }
 
   // A x of the last solve, also where it is prescribed.

@@ -286,9 +286,14 @@ class MeshStepper final : public HairMeshSolver<T> {
       MeshContact<T>& contact = contacts_.data()[turned[k]];
       contact.sticks = 1;
       filter_.prescribe_wholly(contact.vertex);
-      matrix_.factor_column(contact.vertex / layers_, filter_);
       vectors(change_)[contact.vertex] = padded(contact.velocity) - velocity()[contact.vertex];
       vectors(impulse_)[contact.vertex] -= step_ * padded(contact.force);
+    }
+    std::int32_t last = -1;
+    for (std::int32_t k = 0; k < count; ++k) {
+      const std::int32_t column = contacts_.data()[turned[k]].vertex / layers_;
+      if (column != last) matrix_.factor_column(column, filter_);
+      last = column;
     }
     return count > 0;
   }

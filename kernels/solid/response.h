@@ -379,21 +379,24 @@ struct PackContacts {
     write_back(load<R>(better) > R(0), x, pack.position);
   }
 
-  // No particle is faster against the surface that it touches than it has moved against it. A push out of the
-  // solid is no motion, but lengths that pull back what was pushed take that for one: what a solid presses
-  // would lie still at a speed. Where lengths make up for several substeps, how far this one has led is not
-  // known.
+  // No particle is faster than it has moved: against the surface that it touches, or against its root, both
+  // of which move with a scene that moves. A push out of the solid is no motion, but lengths that pull back
+  // what was pushed take that for one: what a solid presses would lie still at a speed. Where lengths make up
+  // for several substeps, how far this one has led is not known.
   RINGLET_FUNCTION void limit_velocities() {
     if (step.skipped_substeps > 0) return;
+    const Vector3<R> root = load3<R>(v, kLanes);
     for (int i = 0; i < particles; ++i) {
       const int at = 3 * i * pack.stride;
       const Vector3<R> surface = load3<R>(pack.surface_velocity + at, pack.stride),
                        own = load3<R>(pack.velocity + at, pack.stride),
                        way = load3<R>(pack.position + at, pack.stride) - load3<R>(x + 3 * i * kLanes, kLanes),
                        moved = fma(lengths.per_h, way, load3<R>(v + 3 * i * kLanes, kLanes));
-      const Vector3<R> slip = own - surface, moved_slip = moved - surface;
+      const auto slower_against = [&](Vector3<R> frame) {
+        return dot(moved - frame, moved - frame) < dot(own - frame, own - frame);
+      };
       // Where nothing has pushed they differ by rounding alone.
-      const Mask<R> faster = dot(moved_slip, moved_slip) < dot(slip, slip);
+      const Mask<R> faster = slower_against(surface) | slower_against(root);
       store3<R>(pack.velocity + at, pack.stride, select(faster, moved, own));
     }
   }

@@ -193,7 +193,7 @@ void HairMeshSimulation<T>::make_plan(std::int64_t strands, std::int64_t particl
   add(kTries, kTriesAre, control != nullptr, bytes_of_tries(), {0, 0});
   add("roots", "the scalp's vertices carried by the head", true, roots, each);
   add("wind", "mean wind, gusts, turbulence", wind_.has_value(), air, each);
-  add("forces", "stretch, shear, bend and volume of the hair mesh, its matrix", true, bodies, each);
+  add("forces", "stretch, shear, bend and volume of the hair mesh; the system", true, bodies, each);
   add("solve", "implicit step by filtered conjugate gradients", true, 0, each);
   add("solids", "outer vertices moved out of level sets and ellipsoids, friction", has_solids(), solids,
       of_substeps(static_cast<std::int64_t>(world_.solids.size()) +

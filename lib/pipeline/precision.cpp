@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "core/error.h"
+#include "core/log.h"
 #include "kernels/strand/strand_batch.h"
 
 namespace ringlet::pipeline {
@@ -28,14 +29,15 @@ void refuse_stiff_in_float(const scene::Scene& scene, std::span<const float> sca
                   "run it with --precision double, or make it softer: hair keeps its length by inextensible");
 }
 
-void refuse_fine_lengths_in_float(const scene::Scene& scene, std::int32_t particles) {
+void hold_lengths_as_float_can(scene::Scene& scene, std::int32_t particles) {
   const double finest = kFinestStrainInFloat * (particles - 1);
   if (!scene.effects.inextensible || scene.effects.inextensible->tolerance >= finest) return;
-  throw Error(
-      ErrorKind::kInput, fmt::format("{}#/effects/inextensible/tolerance", scene.file.string()),
-      fmt::format("is {:.3g}, expected at least {:.2g} in single precision for strands of {} particles",
-                  scene.effects.inextensible->tolerance, finest, particles),
-      "run it with --precision double, or allow more strain");
+  log_warning_once(
+      fmt::format("{}#/effects/inextensible/tolerance: {:g} is finer than single precision tells lengths on "
+                  "strands of {} "
+                  "particles; they are held to {:.3g} (--precision double holds them)",
+                  scene.file.string(), scene.effects.inextensible->tolerance, particles, finest));
+  scene.effects.inextensible->tolerance = finest;
 }
 
 }  // namespace ringlet::pipeline

@@ -15,11 +15,12 @@ inline constexpr double kStiffestInFloat = 1e9;
 void refuse_stiff_in_float(const scene::Scene& scene, std::span<const float> scaled);
 
 // The strain that float tells a segment's length to, for each segment of its strand: positions, from the
-// root, round by 2^-24 of the strand's length, as measured on strands of 34 to 500 particles. What is finer
-// is never met, and strands would take ever more substeps for it.
+// root, round by 2^-24 of the strand's length, as measured on strands of 34 to 500 particles with segments of
+// one length. What is finer is never met, and strands would take ever more substeps for it.
 inline constexpr double kFinestStrainInFloat = 8e-8;
 
-// `particles`: of the longest strand. Throws Error{kInput} where effects.inextensible asks for finer lengths.
-void refuse_fine_lengths_in_float(const scene::Scene& scene, std::int32_t particles);
+// Holds lengths no finer than float tells them, and warns where effects.inextensible asks for that.
+// `particles`: of the strand that has most.
+void hold_lengths_as_float_can(scene::Scene& scene, std::int32_t particles);
 
 }  // namespace ringlet::pipeline

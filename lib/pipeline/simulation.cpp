@@ -54,16 +54,23 @@ std::vector<float> radii(const scene::Scene& scene, const groom::Strands& strand
                                   : "give the files widths, or leave out the shelter");
 }
 
+// The scene as the precision can hold it.
 template <class T>
+const scene::Scene& fitted(scene::Scene& scene, const World& world) {
+  if constexpr (sizeof(T) == sizeof(float)) {
+    refuse_stiff_in_float(scene, world.stiffness);
+    std::int32_t most = 0;
+    const groom::Strands& strands = world.simulated.strands;
+    for (std::size_t s = 0; s < strands.size(); ++s) most = std::max(most, strands.count(s));
+    hold_lengths_as_float_can(scene, most);
+  }
+  return scene;
+}
+
 state::StrandInput strand_input(const scene::Scene& scene, const World& world) {
   state::StrandInput input;
   const groom::Strands& strands = world.simulated.strands;
   for (std::size_t s = 0; s < strands.size(); ++s) input.counts.push_back(strands.count(s));
-  if constexpr (sizeof(T) == sizeof(float)) {
-    refuse_stiff_in_float(scene, world.stiffness);
-    if (!input.counts.empty())
-      refuse_fine_lengths_in_float(scene, *std::max_element(input.counts.begin(), input.counts.end()));
-  }
   input.living = world.living;
   input.rest = strands.points;
   input.stiffness = world.stiffness;
@@ -114,7 +121,7 @@ class TypedSimulation : public Simulation {
         options_(options),
         world_(build_world(scene_)),
         roots_(*world_.simulated.roots),
-        model_(strand_input<T>(scene_, world_)),
+        model_(strand_input(fitted<T>(scene_, world_), world_)),
         state_(model_),
         executor_(make_executor(model_, options_)),
         before_(roots_.strands()),

@@ -27,7 +27,7 @@ std::vector<std::size_t> pareto_front(const std::vector<Point>& points) {
                    [&](std::size_t a, std::size_t b) { return quicker(points[a], points[b]); });
   std::vector<std::size_t> front;
   for (const std::size_t k : order)
-    if (front.empty() || points[k].error < points[front.back()].error) front.push_back(k);
+    if (front.empty() || points[k].error < kGain * points[front.back()].error) front.push_back(k);
   return front;
 }
 
@@ -36,7 +36,8 @@ std::optional<std::size_t> dominating(const std::vector<Point>& points, const st
   std::optional<std::size_t> best;
   if (std::find(front.begin(), front.end(), point) != front.end()) return best;
   for (const std::size_t k : front)
-    if (points[k].milliseconds <= points[point].milliseconds && points[k].error <= points[point].error)
+    if (points[k].milliseconds <= points[point].milliseconds &&
+        kGain * points[k].error <= points[point].error)
       best = k;
   return best;
 }

@@ -13,6 +13,9 @@ struct Point {
   double error;
 };
 
+// An error is smaller than another where it is under this share of it: what differs less tells nothing.
+inline constexpr double kGain = 0.99;
+
 // Indices of the Pareto front, from the quickest to the most accurate: each is more accurate than all that
 // are as quick or quicker. Points that are not finite are on no front.
 std::vector<std::size_t> pareto_front(const std::vector<Point>& points);

@@ -112,6 +112,7 @@ class Page {
 
   void waste() {
     say("## Which settings waste time?\n");
+    if (!study_.complete) return say("Not known before all runs are measured.\n");
     bool any = false;
     for (std::size_t k = 0; k < study_.rows.size(); ++k) {
       if (!answers_.beaten[k]) continue;
@@ -355,6 +356,8 @@ std::string picked_text(const Study& study) {
                           study.length_unit);
   if (!reference_converges(study))
     return fmt::format("which run stays within {} is not known: the reference does not converge\n", wanted);
+  if (!answers.picked && !study.complete)
+    return fmt::format("which run stays within {} is not known: not all are measured\n", wanted);
   if (!answers.picked) return fmt::format("no run stays within {}\n", wanted);
   const Row& row = study.rows[*answers.picked];
   std::string out =

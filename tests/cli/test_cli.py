@@ -366,3 +366,11 @@ def test_a_converted_groom_holds_the_same_points(program, scene, tmp_path):
         assert list(np.diff(groom["offsets"])) == [PARTICLES] * STRANDS
     report = json.loads(run(program, "info", converted, "--json").stdout)
     assert (report["strands"], report["particles"]) == (STRANDS, STRANDS * PARTICLES)
+
+
+def test_lengths_finer_than_single_precision_tells_them_are_warned_of_and_held_as_it_can(program, scene, tmp_path):
+    fine = ["--set", "/effects/inextensible/tolerance=1e-7"]
+    single = run(program, "run", scene, "-o", tmp_path / "single", "--precision", "float", *fine)
+    assert single.returncode == 0 and single.stderr.count("held to 6.4e-07 (--precision double") == 1, single.stderr
+    double = run(program, "run", scene, "-o", tmp_path / "double", "--precision", "double", *fine)
+    assert double.returncode == 0 and "--precision double" not in double.stderr

@@ -335,6 +335,7 @@ def test_a_study_that_is_cut_goes_on_with_the_rows_it_has(program, scene, tmp_pa
     cut = json.loads((out / "study.json").read_text())
     lines = (out / "study.csv").read_text().splitlines()
     assert not cut["complete"] and 2 <= len(cut["rows"]) < 6
+    assert "every run is the quickest of its accuracy" not in (out / "report.md").read_text()
     assert "`--resume` goes on" in (out / "report.md").read_text()
 
     told, rows = study(program, scene, out, "--resume", *options)

@@ -121,5 +121,12 @@ TEST(Solids, KeepsNoSpeedInWhatTheyPress) {
   EXPECT_LE(after.last_speed, kSteps * moved + 1e-9);
 }
 
+// Nor does it take on that of a solid that jumps: it is moved no farther than the box is wide.
+TEST(Solids, LendNoSpeedToWhatTheyJumpOn) {
+  constexpr double kHalf = 0.05;
+  const Scenario scenario = appearing("box_jumps_on_tips", {kHalf, kHalf, 0.3}, {0.17, 0, 0});
+  EXPECT_LE(run(scenario).speed, 2 * kHalf / kStep);
+}
+
 }  // namespace
 }  // namespace ringlet::stability

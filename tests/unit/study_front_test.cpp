@@ -29,6 +29,14 @@ TEST(StudyFront, HoldsWhatNothingQuickerMatches) {
   EXPECT_FALSE(dominating(points, front, 0));
 }
 
+TEST(StudyFront, HoldsNoErrorThatIsSmallerByLessThanItTells) {
+  const std::vector<Point> points = {{1, 0.5}, {2, 0.4999999}, {3, 0.497}, {4, 0.4}};
+  const auto front = pareto_front(points);
+  EXPECT_THAT(front, ElementsAre(0, 3));
+  EXPECT_EQ(dominating(points, front, 1), 0u);
+  EXPECT_EQ(dominating(points, front, 2), 0u);
+}
+
 TEST(StudyFront, OfRandomPointsIsThatOfEveryPair) {
   std::mt19937 generator(5);
   std::uniform_real_distribution<double> uniform(0.1, 10);
@@ -38,7 +46,7 @@ TEST(StudyFront, OfRandomPointsIsThatOfEveryPair) {
   for (std::size_t k = 0; k < points.size(); ++k) {
     bool beaten = false;
     for (const Point& other : points)
-      beaten = beaten || (other.milliseconds < points[k].milliseconds && other.error <= points[k].error);
+      beaten = beaten || (other.milliseconds < points[k].milliseconds && kGain * other.error <= points[k].error);
     if (!beaten) expected.push_back(k);
   }
   EXPECT_THAT(pareto_front(points), testing::UnorderedElementsAreArray(expected));

@@ -46,7 +46,8 @@ TEST(StudyFront, OfRandomPointsIsThatOfEveryPair) {
   for (std::size_t k = 0; k < points.size(); ++k) {
     bool beaten = false;
     for (const Point& other : points)
-      beaten = beaten || (other.milliseconds < points[k].milliseconds && kGain * other.error <= points[k].error);
+      beaten =
+          beaten || (other.milliseconds < points[k].milliseconds && kGain * other.error <= points[k].error);
     if (!beaten) expected.push_back(k);
   }
   EXPECT_THAT(pareto_front(points), testing::UnorderedElementsAreArray(expected));

@@ -30,7 +30,7 @@ struct HairMeshParameters {
 struct SolveFigures {
   std::int32_t iterations = 0;
   // Of r = S (b - A x), the root of r . D^-1 r over the same at the start, where x is as prescribed; D holds
-  // the matrix' blocks in each column of the mesh.
+  // the matrix' blocks in each column of the mesh. Where friction stops vertices the start stays the first.
   double residual = 0;
 };
 

@@ -121,7 +121,7 @@ TEST(Solids, KeepsNoSpeedInWhatTheyPress) {
   EXPECT_LE(after.last_speed, kSteps * moved + 1e-9);
 }
 
-// Nor does it take on that of a solid that jumps: it is moved no farther than the box is wide.
+// Hair that a solid jumps onto is moved no farther than the solid is wide, and is no faster than that.
 TEST(Solids, LendNoSpeedToWhatTheyJumpOn) {
   constexpr double kHalf = 0.05;
   const Scenario scenario = appearing("box_jumps_on_tips", {kHalf, kHalf, 0.3}, {0.17, 0, 0});

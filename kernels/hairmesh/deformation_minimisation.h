@@ -5,7 +5,7 @@
 // 0 with u given there, A the edges' incidence matrix: a scalar Laplacian of the mesh, fixed once and for
 // all.
 #pragma once
-#include "kernels/hairmesh/vertex_filter.h"
+#include "kernels/hairmesh/pair_lanes.h"
 
 namespace ringlet::kernels {
 inline namespace RINGLET_ISA {
@@ -16,82 +16,112 @@ template <class T>
 class MeshLaplacian {
  public:
   // `degree` counts a column's edges of the scalp; of their other ends `neighbour` holds the later columns.
-  MeshLaplacian(std::int32_t columns, std::int32_t layers, std::int32_t first_layer,
-                const std::int32_t* degree, const std::int32_t* first, const std::int32_t* neighbour)
-      : columns_(columns), layers_(layers), first_layer_(first_layer) {
-    const auto count = static_cast<std::size_t>(columns);
-    copy_values(degree_, degree, count), copy_values(first_, first, count + 1);
-    copy_values(neighbour_, neighbour, static_cast<std::size_t>(first[columns]));
-    zero_values(count * static_cast<std::size_t>(layers), inverse_), zero_values(inverse_.size(), below_);
+  MeshLaplacian(const PairLanes<T>& lanes, std::int32_t first_layer, const std::int32_t* degree,
+                const std::int32_t* first, const std::int32_t* neighbour)
+      : lanes_(lanes) {
+    const auto pairs = static_cast<std::size_t>(lanes.pairs());
+    zero_values(kOctet * pairs * static_cast<std::size_t>(lanes.fours()), degree_, joined_);
+    zero_values(kOctet * pairs * static_cast<std::size_t>(lanes.rows()), inverse_, below_);
+    zero_values(4 * kOctet * static_cast<std::size_t>(lanes.fours()), solved_);
+    first_.resize(2 * pairs + 1), offset_.resize(static_cast<std::size_t>(first[lanes.columns()]));
+    std::int32_t* offset = offset_.data();
+    for (std::int32_t k = 0; k < lanes.pairs(); ++k)
+      for (int half = 0; half < 2; ++half) {
+        const std::int32_t c = lanes.pair(k).column[half];
+        first_.data()[2 * k + half] = static_cast<std::int32_t>(offset - offset_.data());
+        if (!lanes.is_column(c)) continue;
+        for (std::int32_t n = first[c]; n < first[c + 1]; ++n) *offset++ = lanes.offset(neighbour[n]);
+        for (std::int32_t row = 0; row < lanes.rows(); ++row) {
+          const bool has_below = row + first_layer > 0, has_above = row + 1 < lanes.rows();
+          *lane(degree_, k, half, row) =
+              static_cast<T>(degree[c] + (has_below ? 1 : 0) + (has_above ? 1 : 0));
+          *lane(joined_, k, half, row) = has_above ? T(1) : T(0);
+        }
+      }
+    first_.data()[2 * pairs] = static_cast<std::int32_t>(offset - offset_.data());
   }
 
-  std::int32_t columns() const { return columns_; }
-  std::int32_t first_row(std::int32_t column) const { return column * layers_ + first_layer_; }
-  std::int32_t end_row(std::int32_t column) const { return (column + 1) * layers_; }
   std::size_t bytes() const {
-    return degree_.bytes() + first_.bytes() + neighbour_.bytes() + inverse_.bytes() + below_.bytes();
+    return first_.bytes() + offset_.bytes() + degree_.bytes() + joined_.bytes() + inverse_.bytes() +
+           below_.bytes() + solved_.bytes();
   }
 
   // Factors the columns, with vertices that are wholly prescribed taken out.
   void factor(const VertexFilter<T>& filter) {
-    for (std::int32_t c = 0; c < columns_; ++c) {
-      bool joined = false;  // to the vertex below
-      for (std::int32_t i = first_row(c); i < end_row(c); ++i) {
-        const bool free = filter.is_free(i);
-        const T below = joined && free ? -inverse_.data()[i - 1] : T(0);
-        below_.data()[i] = below;
-        inverse_.data()[i] = free ? T(1) / (degree(c, i) + below) : T(1);
-        joined = free;
+    for (std::int32_t c = 0; c < lanes_.columns(); ++c) {
+      const std::int32_t place = lanes_.place(c), first = lanes_.first_vertex(c);
+      T last = 0;  // 1 / E of the vertex below, where one is joined to it
+      for (std::int32_t row = 0; row < lanes_.rows(); ++row) {
+        const bool free = filter.is_free(first + row);
+        const T below = free ? -last : T(0);
+        const T inverse = free ? T(1) / (*lane(degree_, place / 2, place % 2, row) + below) : T(1);
+        const std::int64_t at =
+            kOctet * (std::int64_t{place / 2} * lanes_.rows() + row) + kSecondHalf * (place % 2);
+        for (int k = 0; k < 4; ++k) below_.data()[at + k] = below, inverse_.data()[at + k] = inverse;
+        last = free ? inverse : T(0);
       }
     }
   }
-  RINGLET_KERNEL void solve_column(std::int32_t column, const Padded<T>* g, Padded<T>* x) const {
-    const std::int32_t begin = first_row(column), end = end_row(column);
-    Padded<T> last{};
-    for (std::int32_t i = begin; i < end; ++i) {
-      last = g[i] - below_.data()[i] * last;
-      x[i] = inverse_.data()[i] * last;
-    }
-    for (std::int32_t i = end - 2; i >= begin; --i) x[i] -= below_.data()[i + 1] * x[i + 1];
+  RINGLET_KERNEL void solve(std::int32_t pair, const Octets<T>* g, Octets<T>* x) const {
+    const std::int64_t first = std::int64_t{pair} * lanes_.rows();
+    const auto *below = reinterpret_cast<const Octets<T>*>(below_.data()) + first,
+               *inverse = reinterpret_cast<const Octets<T>*>(inverse_.data()) + first;
+    auto* solved = reinterpret_cast<Octets<T>*>(solved_.data());
+    Octets<T> last{};
+    lanes_.read_rows(g, [&](std::int32_t i, Octets<T> w) {
+      last = w - below[i] * last;
+      solved[i] = inverse[i] * last;
+    });
+    lanes_.write_rows(x, [&](std::int32_t i) {
+      last = i + 1 < lanes_.rows() ? solved[i] - below[i + 1] * last : solved[i];
+      return last;
+    });
   }
-  RINGLET_KERNEL void later_columns(std::int32_t column, const Padded<T>* x, Padded<T>* y) const {
-    const std::int32_t *begin = neighbour_.data() + first_.data()[column],
-                       *end = neighbour_.data() + first_.data()[column + 1];
-    for (std::int32_t i = first_row(column); i < end_row(column); ++i) {
-      const Padded<T>* beside = x + (i - column * layers_);
-      Padded<T> sum{};
-      for (const std::int32_t* other = begin; other < end; ++other) sum -= beside[*other * layers_];
-      y[i] = sum;
-    }
-  }
-  RINGLET_KERNEL void add_to_later_columns(std::int32_t column, const Padded<T>* x, Padded<T>* to) const {
-    const std::int32_t *begin = neighbour_.data() + first_.data()[column],
-                       *end = neighbour_.data() + first_.data()[column + 1];
-    for (std::int32_t i = first_row(column); i < end_row(column); ++i) {
-      Padded<T>* beside = to + (i - column * layers_);
-      for (const std::int32_t* other = begin; other < end; ++other) beside[*other * layers_] -= x[i];
+  RINGLET_KERNEL void later(std::int32_t pair, const T* x, Octets<T>* y) const {
+    const std::int32_t* first = first_.data() + 2 * pair;
+    for (std::int32_t k = 0; k < lanes_.octets(); ++k) {
+      Padded<T> sum[2]{};
+      for (int half = 0; half < 2; ++half)
+        for (std::int32_t n = first[half]; n < first[half + 1]; ++n)
+          sum[half] -= four_at(x + offset_.data()[n] + kOctet * k);
+      y[k] = side_by_side<T>(sum[0], sum[1]);
     }
   }
-  RINGLET_KERNEL void own_column(std::int32_t column, const Padded<T>* x, Padded<T>* y) const {
-    const std::int32_t begin = first_row(column), end = end_row(column);
-    for (std::int32_t i = begin; i < end; ++i) {
-      Padded<T> sum = degree(column, i) * x[i];
-      if (i > begin) sum -= x[i - 1];
-      if (i + 1 < end) sum -= x[i + 1];
-      y[i] += sum;
+  RINGLET_KERNEL void add_to_later(std::int32_t pair, const Octets<T>* x, T* to) const {
+    const std::int32_t* first = first_.data() + 2 * pair;
+    for (std::int32_t k = 0; k < lanes_.octets(); ++k) {
+      const Padded<T> half_of[2] = {first_half<T>(x[k]), second_half<T>(x[k])};
+      for (int half = 0; half < 2; ++half)
+        for (std::int32_t n = first[half]; n < first[half + 1]; ++n)
+          *reinterpret_cast<Padded<T>*>(to + offset_.data()[n] + kOctet * k) -= half_of[half];
     }
+  }
+  RINGLET_KERNEL void add_own(std::int32_t pair, const Octets<T>* x, Octets<T>* y) const {
+    const auto *degree =
+                   reinterpret_cast<const Octets<T>*>(degree_.data()) + std::int64_t{pair} * lanes_.fours(),
+               *joined =
+                   reinterpret_cast<const Octets<T>*>(joined_.data()) + std::int64_t{pair} * lanes_.fours();
+    const Octets<T> none{};
+    for (std::int32_t four = 0; four < lanes_.fours(); ++four)
+      for (int c = 0; c < 3; ++c) {
+        const std::int32_t k = 3 * four + c;
+        const Octets<T> before = four > 0 ? joined[four - 1] * x[k - 3] : none,
+                        above = shift_down(x[k], four + 1 < lanes_.fours() ? x[k + 3] : none);
+        y[k] += degree[four] * x[k] - (shift_up(before, joined[four] * x[k]) + joined[four] * above);
+      }
   }
 
  private:
-  // Edges at a vertex.
-  RINGLET_KERNEL T degree(std::int32_t column, std::int32_t row) const {
-    const std::int32_t layer = row - column * layers_;
-    return static_cast<T>(degree_.data()[column] + (layer > 0 ? 1 : 0) + (layer + 1 < layers_ ? 1 : 0));
+  T* lane(const HostBuffer<T>& values, std::int32_t pair, std::int32_t half, std::int32_t row) const {
+    return values.data() + kOctet * (std::int64_t{pair} * lanes_.fours() + row / 4) + kSecondHalf * half +
+           row % 4;
   }
 
-  std::int32_t columns_, layers_, first_layer_;
-  HostBuffer<std::int32_t> degree_, first_, neighbour_;
-  HostBuffer<T> inverse_, below_;  // of a vertex: 1 / E, and N to the one below
+  const PairLanes<T>& lanes_;
+  HostBuffer<std::int32_t> first_, offset_;
+  HostBuffer<T> degree_, joined_;  // of a vertex: its edges, whether one leads up
+  HostBuffer<T> inverse_, below_;  // of a vertex: 1 / E, and N to the one below, in all of its half
+  HostBuffer<T> solved_;
 };
 
 }  // namespace RINGLET_ISA

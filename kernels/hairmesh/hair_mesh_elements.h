@@ -92,27 +92,32 @@ struct MeshArray {
   std::int32_t count;
 };
 
-// Blocks lie two by two: reals of a pair, where its second block begins, and the distance of a block's
-// columns, which are padded to four reals.
+// Blocks lie two by two, those of a pair's columns side by side: reals of both, where the second begins, and
+// the distance of a block's columns, which are padded to four reals.
 inline constexpr std::int32_t kPairReals = 24, kSecondBlock = 4, kBlockColumn = 8;
-// A row begins with its blocks in its own column of the mesh: with itself, the vertex above and the one above
-// that.
-inline constexpr std::int32_t kOwnPairs = 2;
-inline constexpr std::int32_t kOwnBlock[] = {0, kSecondBlock, kPairReals};
+// Blocks of a row in its own column of the mesh: with itself, the vertex above and the one above that.
+inline constexpr std::int32_t kOwnBlocks = 3;
 
 // Between two columns of the mesh lie bands of blocks, one for each difference of layers: -1, 0, 1, or 0
 // alone.
 inline constexpr std::int32_t kSlopes = 3;
 
+// Two columns of the mesh; the number of columns stands for none.
+struct ColumnPair {
+  std::int32_t column[2];
+};
+
 // Which blocks the matrix has: rows are vertices, held roots have none. Of the symmetric matrix the upper
 // half is there. See BlockMatrix.
 struct BlockPattern {
   std::int32_t columns, layers;
-  std::int32_t first_layer;   // that is free: 1 where roots are held, else 0
-  const std::int32_t* first;  // [columns][2], and the end: where in `other` a column's begin that have three
-                              // bands with it, and those that have one
-  const std::int32_t* other;  // later columns
-  const std::int32_t* first_pair;  // [columns + 1] of their blocks
+  std::int32_t first_layer;     // that is free: 1 where roots are held, else 0
+  MeshArray<ColumnPair> pairs;  // of columns that are not coupled, in the order of sweeps
+  const std::int32_t* first;    // [pairs][2], and the end: where in `other` those of a pair begin that have
+                                // three bands with it, and those that have one
+  const ColumnPair* other;      // later columns, one for each column of the pair
+  const std::int32_t* first_band;  // [pairs + 1] of each pair's bands
+  std::int32_t blocks;             // two by two; the last takes those of held roots, which nobody reads
 };
 
 // A place of the outer surface between vertices: the middle of an edge or a face.

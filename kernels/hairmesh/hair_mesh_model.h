@@ -38,7 +38,7 @@ class HairMeshModel {
       : mesh_(mesh),
         rest_(rest),
         parameters_(parameters),
-        pattern_(mesh.columns, mesh.layers, parameters.held_roots) {
+        pattern_(column_order(), mesh.columns, mesh.layers, parameters.held_roots) {
     tetrahedra_ = mesh_.corner_tetrahedra();
     measure_prisms();
     add_masses();
@@ -81,6 +81,29 @@ class HairMeshModel {
   }
 
  private:
+  // Columns of a face are coupled, and those two apart along a pass.
+  ColumnOrder column_order() const {
+    std::vector<std::vector<std::int32_t>> beside(index(mesh_.columns));
+    const auto couple = [&](std::int32_t a, std::int32_t b) {
+      beside[index(a)].push_back(b), beside[index(b)].push_back(a);
+    };
+    for (const ScalpFace& face : mesh_.faces)
+      for (int i = 0; i < face.corners(); ++i)
+        for (int j = 0; j < i; ++j) couple(face.corner[index(i)], face.corner[index(j)]);
+    for (const ScalpPass& pass : passes()) couple(pass.before, pass.after);
+    for (std::vector<std::int32_t>& others : beside) {
+      std::sort(others.begin(), others.end());
+      others.erase(std::unique(others.begin(), others.end()), others.end());
+    }
+    return ColumnOrder(beside);
+  }
+  std::vector<ScalpPass> passes() const {
+    std::vector<double> scalp;
+    for (std::int32_t c = 0; c < mesh_.columns; ++c)
+      for (const double x : at(mesh_.vertex(c, 0))) scalp.push_back(x);
+    return scalp_passes(mesh_, scalp);
+  }
+
   template <class E>
   static MeshArray<E> array(const std::vector<E>& values) {
     return {values.data(), static_cast<std::int32_t>(values.size())};
@@ -135,7 +158,7 @@ class HairMeshModel {
     const double length = std::sqrt(dot(edge, edge));
     MeshSpring<T> spring{{a, b}, {}, static_cast<T>(stiffness), static_cast<T>(1 / length), {}};
     for (int k = 0; k < 3; ++k) spring.direction[k] = static_cast<T>(edge[index(k)] / length);
-    if (a > b) {
+    if (pattern_.is_before(b, a)) {
       std::swap(spring.vertex[0], spring.vertex[1]);
       for (T& d : spring.direction) d = -d;
     }
@@ -173,7 +196,7 @@ class HairMeshModel {
     MeshSheet<T> sheet{};
     std::array<std::int32_t, 3> vertices{corner, along, across}, order{0, 1, 2};
     std::sort(order.begin(), order.end(),
-              [&](int i, int j) { return vertices[index(i)] < vertices[index(j)]; });
+              [&](int i, int j) { return pattern_.is_before(vertices[index(i)], vertices[index(j)]); });
     const double u[] = {-1 / du, 1 / du, 0};
     const double v[] = {(lean / du - 1) / dv, -lean / (du * dv), 1 / dv};
     for (int i = 0; i < 3; ++i) {
@@ -225,10 +248,7 @@ class HairMeshModel {
           }
         }
     if (!(parameters_.bend_across > 0)) return;
-    std::vector<double> scalp;
-    for (std::int32_t c = 0; c < mesh_.columns; ++c)
-      for (const double x : at(mesh_.vertex(c, 0))) scalp.push_back(x);
-    for (const ScalpPass& pass : scalp_passes(mesh_, scalp))
+    for (const ScalpPass& pass : passes())
       for (std::int32_t l = parameters_.held_roots ? 1 : 0; l < mesh_.layers; ++l) {
         const std::int32_t centre = mesh_.vertex(pass.centre, l);
         add_bend(mesh_.vertex(pass.before, l), centre, mesh_.vertex(pass.after, l),
@@ -249,7 +269,8 @@ class HairMeshModel {
     const std::int32_t vertices[] = {before, centre, after, beside};
     const double own[] = {a, b - a - 1, 1, -b}, first[] = {1, -1, 0, 0}, second[] = {0, -1, 0, 1};
     std::array<int, 4> order{0, 1, 2, 3};
-    std::sort(order.begin(), order.end(), [&](int i, int j) { return vertices[i] < vertices[j]; });
+    std::sort(order.begin(), order.end(),
+              [&](int i, int j) { return pattern_.is_before(vertices[i], vertices[j]); });
     MeshBend<T> bend{};
     for (int i = 0; i < 4; ++i) {
       const int from = order[index(i)];
@@ -276,7 +297,7 @@ class HairMeshModel {
       std::copy(std::begin(t.vertex), std::end(t.vertex), volume.vertex);
       int swaps = 0;  // sorted by insertion, to know whether that turns it over
       for (int i = 1; i < 4; ++i)
-        for (int j = i; j > 0 && volume.vertex[j] < volume.vertex[j - 1]; --j, ++swaps)
+        for (int j = i; j > 0 && pattern_.is_before(volume.vertex[j], volume.vertex[j - 1]); --j, ++swaps)
           std::swap(volume.vertex[j], volume.vertex[j - 1]);
       volume.scale = static_cast<T>((swaps % 2 == 0 ? 1 : -1) / (6 * mean));
       volume.rest = static_cast<T>(signed_volume(t.vertex) / mean);
@@ -339,7 +360,8 @@ class HairMeshModel {
     std::vector<std::vector<std::int32_t>> later(index(mesh_.columns));
     degree_.assign(index(mesh_.columns), 0);
     for (const ScalpEdge& edge : mesh_.edges) {
-      later[index(edge.end[0])].push_back(edge.end[1]);
+      const bool turned = pattern_.order().is_before(edge.end[1], edge.end[0]);
+      later[index(edge.end[turned])].push_back(edge.end[!turned]);
       for (const std::int32_t end : edge.end) ++degree_[index(end)];
     }
     first_neighbour_.assign(1, 0);

@@ -48,15 +48,15 @@ class MeshStepper final : public HairMeshSolver<T> {
         external_(mesh.external),
         samples_(mesh.samples),
         surface_({mesh.surface.data, 4 * mesh.surface.count}),
-        matrix_(mesh.pattern),
-        laplacian_(columns_, layers_, mesh.pattern.first_layer, mesh.degree, mesh.first_neighbour,
-                   mesh.neighbour),
+        lanes_(columns_, layers_, mesh.pattern.first_layer, mesh.pattern.pairs),
+        matrix_(mesh.pattern, lanes_),
+        laplacian_(lanes_, mesh.pattern.first_layer, mesh.degree, mesh.first_neighbour, mesh.neighbour),
         filter_(columns_, layers_),
-        gradients_(vertices_) {
+        gradients_(lanes_) {
     const auto count = static_cast<std::size_t>(vertices_);
     copy_values(mass_, mesh.mass, count);
-    zero_values(4 * (count + kBeyond), position_, velocity_, impulse_, change_, displacement_, rubbing_,
-                carried_, before_);
+    zero_values(4 * count, position_, velocity_, impulse_, change_, displacement_, rubbing_, carried_,
+                before_);
     zero_values(count, held_), zero_values(count, holder_), zero_values(count, moved_in_);
     zero_values(count, contact_of_);
     roots_.resize(4 * static_cast<std::size_t>(columns_));
@@ -96,6 +96,7 @@ class MeshStepper final : public HairMeshSolver<T> {
     for (const MeshSheet<T>& e : sheets_) add_to<T>(system, e);
     for (const MeshBend<T>& e : bends_) add_to<T>(system, e);
     for (const MeshVolume<T>& e : volumes_) add_to<T>(system, e);
+    matrix_.finish();
   }
 
   SolveFigures solve() override {
@@ -203,15 +204,16 @@ class MeshStepper final : public HairMeshSolver<T> {
   }
 
   std::size_t bytes() const override {
-    const std::size_t total = matrix_.bytes() + laplacian_.bytes() + gradients_.bytes() + springs_.bytes() +
-                              sheets_.bytes() + bends_.bytes() + volumes_.bytes() + external_.bytes() +
-                              samples_.bytes() + surface_.bytes();
+    const std::size_t total = lanes_.bytes() + matrix_.bytes() + laplacian_.bytes() + gradients_.bytes() +
+                              springs_.bytes() + sheets_.bytes() + bends_.bytes() + volumes_.bytes() +
+                              external_.bytes() + samples_.bytes() + surface_.bytes();
     return total + mass_.bytes() + 8 * position_.bytes() + roots_.bytes() + filter_.bytes() +
            corrected_.bytes() + turned_.bytes() + held_.bytes() + holder_.bytes() + moved_in_.bytes() +
            contact_of_.bytes() + contacts_.bytes();
   }
 
-  const BlockMatrix<T>& matrix() const { return matrix_; }
+  // y = A x
+  void multiply(const Padded<T>* x, Padded<T>* y) { gradients_.multiply(matrix_, x, y); }
   const Padded<T>* impulse() const { return vectors(impulse_); }
   const Padded<T>* change() const { return vectors(change_); }
 
@@ -305,7 +307,7 @@ class MeshStepper final : public HairMeshSolver<T> {
   void rub(const MeshContact<T>& contact, Padded<T> carried) {
     const std::int32_t i = contact.vertex;
     const Padded<T> n = padded(contact.normal),
-                    held = carried + (gradients_.product()[i] - vectors(impulse_)[i]);
+                    held = carried + (gradients_.product(i) - vectors(impulse_)[i]);
     const T push = dot_product(n, held);
     held_.data()[i] = kReleased, holder_.data()[i] = contact.solid;
     if (!(push > T(0))) return;
@@ -449,6 +451,7 @@ class MeshStepper final : public HairMeshSolver<T> {
   MeshElements<std::int32_t> external_;
   MeshElements<MeshSample<T>> samples_;
   MeshElements<std::int32_t> surface_;
+  PairLanes<T> lanes_;
   BlockMatrix<T> matrix_;
   MeshLaplacian<T> laplacian_;
   VertexFilter<T> filter_;

@@ -82,9 +82,8 @@ struct Made {
   explicit Made(const HairMeshParameters& parameters = free_parameters(),
                 RestMesh rest = hair_cap({5, 9, 9}, 4, 0.05, 0.3, 0.02))
       : mesh(std::move(rest)), model(mesh.topology, mesh.rest, parameters), view(model.view()) {
-    const auto& p = view.pattern;
-    const auto pairs = p.first_pair[p.columns] + p.columns * p.layers * kernels::kOwnPairs + 1;
-    matrix.assign(static_cast<std::size_t>(pairs) * kernels::kPairReals / 4, Padded<double>{});
+    const auto blocks = static_cast<std::size_t>(view.pattern.blocks);
+    matrix.assign(blocks * kernels::kPairReals / 4, Padded<double>{});
   }
   template <class F>
   void each_kind(const F& f) const {
@@ -169,7 +168,7 @@ kernels::HairMeshStep<double> step_of(const std::vector<double>& roots, double h
 }
 
 // The matrix of a solver, column after column of what it makes of unit vectors, over what is free.
-Matrix dense(const MeshStepper<double>& solver, int columns, int layers, int first_layer) {
+Matrix dense(MeshStepper<double>& solver, int columns, int layers, int first_layer) {
   const int rows = columns * (layers - first_layer);
   Matrix a(3 * rows, 3 * rows);
   const auto vertex = [&](int row) {
@@ -179,7 +178,7 @@ Matrix dense(const MeshStepper<double>& solver, int columns, int layers, int fir
   for (int j = 0; j < rows; ++j)
     for (int c = 0; c < 3; ++c) {
       x[vertex(j)][c] = 1;
-      kernels::FilteredConjugateGradients<double>::multiply(solver.matrix(), x.data(), y.data());
+      solver.multiply(x.data(), y.data());
       x[vertex(j)][c] = 0;
       for (int i = 0; i < rows; ++i)
         for (int k = 0; k < 3; ++k) a(3 * i + k, 3 * j + c) = y[vertex(i)][k];

@@ -45,14 +45,14 @@ struct Solve {
 };
 
 // Rows of free vertices.
-Matrix dense(const MeshStepper<double>& solver, const HairMeshTopology& t, const std::vector<int>& rows) {
+Matrix dense(MeshStepper<double>& solver, const HairMeshTopology& t, const std::vector<int>& rows) {
   const auto count = static_cast<Eigen::Index>(rows.size());
   Matrix a(3 * count, 3 * count);
   std::vector<Padded<double>> x(static_cast<std::size_t>(t.vertices()) + 2, Padded<double>{}), y = x;
   for (Eigen::Index j = 0; j < count; ++j)
     for (int c = 0; c < 3; ++c) {
       x[rows[j]][c] = 1;
-      kernels::FilteredConjugateGradients<double>::multiply(solver.matrix(), x.data(), y.data());
+      solver.multiply(x.data(), y.data());
       x[rows[j]][c] = 0;
       for (Eigen::Index i = 0; i < count; ++i)
         for (int k = 0; k < 3; ++k) a(3 * i + k, 3 * j + c) = y[rows[i]][k];

@@ -277,8 +277,10 @@ struct DenseSystem {
 };
 
 TEST(HairMeshMatrix, IsWhatItsConditionsMakeOfItAndSymmetric) {
-  for (const int layers : {3, 4}) {
-    Made made(free_parameters(), hair_cap({4, 6}, layers, 0.05, 0.3, 0.02));
+  for (const RestMesh& mesh : {hair_cap({4, 6}, 3, 0.05, 0.3, 0.02), hair_cap({4, 6}, 4, 0.05, 0.3, 0.02),
+                               hair_cap({4, 6}, 10, 0.05, 0.3, 0.002), hanging_lock(3, 6, 0.1, 0.2)}) {
+    const int layers = mesh.topology.layers;
+    Made made(free_parameters(), mesh);
     MeshStepper<double> solver(made.view);
     const std::vector<double> x = inverted(made.mesh), still(x.size(), 0);
     solver.set_state(x.data(), still.data());
@@ -318,6 +320,36 @@ TEST(HairMeshMatrix, IsPositiveDefiniteWithInvertedPrisms) {
         *std::min_element(made.view.mass, made.view.mass + made.view.columns * made.view.layers);
     // The rest of the matrix only adds to the masses.
     EXPECT_GE(eigenvalues[0], lightest * (1 - 1e-9));
+  }
+}
+
+// Sweeps go over a pair's columns side by side, and in order over those that are coupled.
+TEST(HairMeshMatrix, PairsColumnsThatNothingCouples) {
+  for (const RestMesh& mesh : {paper_mesh(215), paper_mesh(361), paper_mesh(2305),
+                               hanging_lock(6, 3, 0.1, 0.2), prism_column(3, 3, 0.02, 0.1)}) {
+    const HairMeshModel<double> model(mesh.topology, mesh.rest, {});
+    const kernels::BlockPattern pattern = model.view().pattern;
+    std::vector<int> place(static_cast<std::size_t>(pattern.columns), -1);
+    int alone = 0;
+    for (int k = 0; k < pattern.pairs.count; ++k)
+      for (int half = 0; half < 2; ++half) {
+        const int column = pattern.pairs.data[k].column[half];
+        if (column == pattern.columns) {
+          EXPECT_EQ(half, 1);
+          ++alone;
+        } else {
+          EXPECT_EQ(std::exchange(place[column], 2 * k + half), -1) << column;
+        }
+      }
+    EXPECT_EQ(std::count(place.begin(), place.end(), -1), 0);
+    EXPECT_LE(alone, 3) << pattern.columns;
+    for (int k = 0; k < pattern.pairs.count; ++k)
+      for (int group = pattern.first[2 * k]; group < pattern.first[2 * k + 2]; ++group)
+        for (const int other : pattern.other[group].column) {
+          if (other < pattern.columns) {
+            EXPECT_GT(place[other], 2 * k + 1);
+          }
+        }
   }
 }
 

@@ -61,10 +61,12 @@ Matrix dense(MeshStepper<double>& solver, const HairMeshTopology& t, const std::
 }
 
 TEST(HairMeshSolve, AgreesWithADenseSolveAndKeepsWhatIsPrescribed) {
-  for (const int layers : {4, 5}) {
+  for (const RestMesh& mesh : {hair_cap({5, 8}, 4, 0.05, 0.4, 0.01), hair_cap({5, 8}, 5, 0.05, 0.4, 0.01),
+                               hair_cap({5, 8}, 10, 0.05, 0.4, 0.002), hanging_lock(3, 7, 0.1, 0.2)}) {
+    const int layers = mesh.topology.layers;
     HairMeshParameters parameters;
     parameters.tolerance = 1e-11;
-    Solve s(hair_cap({5, 8}, layers, 0.05, 0.4, 0.01), parameters);
+    Solve s(mesh, parameters);
     const HairMeshTopology& t = s.mesh.topology;
     s.solver.set_state(s.position.data(), s.velocity.data());
     const Eigen::Vector3d normal = Eigen::Vector3d(1, 2, -2) / 3, surface(0.3, 0.1, -0.2);
@@ -137,10 +139,11 @@ TEST(HairMeshSolve, ReachesItsToleranceInFloat) {
 }
 
 // Spring lengths of edges as they were, in the least squares, with corrected vertices and roots kept.
-TEST(HairMeshMinimisation, AgreesWithConstrainedLeastSquares) {
+class HairMeshMinimisation : public testing::TestWithParam<int> {};
+TEST_P(HairMeshMinimisation, AgreesWithConstrainedLeastSquares) {
   HairMeshParameters parameters;
   parameters.tolerance = 1e-12;
-  Solve s(hair_cap({5, 8, 8}, 4, 0.05, 0.3), parameters);
+  Solve s(hair_cap({5, 8, 8}, GetParam(), 0.05, 0.3), parameters);
   const HairMeshTopology& t = s.mesh.topology;
   s.solver.set_state(s.position.data(), s.velocity.data());
   s.solver.assemble(s.step), s.solver.solve();
@@ -192,6 +195,54 @@ TEST(HairMeshMinimisation, AgreesWithConstrainedLeastSquares) {
         EXPECT_EQ(moved, 0);
       }
     }
+}
+
+INSTANTIATE_TEST_SUITE_P(Layers, HairMeshMinimisation, testing::Values(4, 7));
+
+// A solve that goes on, with more prescribed and a new right-hand side, ends where a dense one does.
+TEST(HairMeshSolve, GoesOnFromWhatItHas) {
+  const RestMesh mesh = hair_cap({5, 8}, 7, 0.05, 0.3);
+  const HairMeshTopology& t = mesh.topology;
+  const HairMeshModel<double> model(t, mesh.rest, {});
+  const HairMeshView<double> view = model.view();
+  const kernels::PairLanes<double> lanes(t.columns, t.layers, 1, view.pattern.pairs);
+  kernels::MeshLaplacian<double> laplacian(lanes, 1, view.degree, view.first_neighbour, view.neighbour);
+  kernels::VertexFilter<double> filter(t.columns, t.layers);
+  kernels::FilteredConjugateGradients<double> gradients(lanes);
+  Matrix a = Matrix::Zero(t.vertices(), t.vertices());
+  for (const auto& [i, j] : t.mesh_edges()) a(i, i) += 1, a(j, j) += 1, a(i, j) -= 1, a(j, i) -= 1;
+  std::mt19937 engine(3);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  std::vector<Padded<double>> x(static_cast<std::size_t>(t.vertices()), Padded<double>{}), b = x;
+  const auto solve = [&](const std::vector<int>& held, auto go) {
+    for (Padded<double>& value : b)
+      value += Padded<double>{uniform(engine), uniform(engine), uniform(engine), 0};
+    for (const int v : held) filter.prescribe_wholly(v);
+    laplacian.factor(filter);
+    const kernels::SolveFigures figures = (gradients.*go)(laplacian, filter, 1e-12, 100, b.data(), x.data());
+    EXPECT_LE(figures.residual, 1e-12);
+    EXPECT_GT(figures.iterations, 3);
+  };
+  using Gradients = kernels::FilteredConjugateGradients<double>;
+  std::vector<int> held{t.vertex(2, 3)};
+  solve(held, &Gradients::solve<kernels::MeshLaplacian<double>>);
+  EXPECT_EQ(x[held[0]][0], 0);
+  for (const int v : {t.vertex(2, 5), t.vertex(8, 6), t.vertex(9, 1)})
+    held.push_back(v), x[v] = Padded<double>{1, -2, 0.5, 0};
+  solve(held, &Gradients::solve_on<kernels::MeshLaplacian<double>>);
+  EXPECT_EQ(x[held[1]][1], -2);
+  std::vector<int> free;
+  for (int v = 0; v < t.vertices(); ++v)
+    if (t.layer_of(v) > 0 && std::count(held.begin(), held.end(), v) == 0) free.push_back(v);
+  const Matrix inner = a(free, free), outer = a(free, held);
+  for (int axis = 0; axis < 3; ++axis) {
+    Vector right(static_cast<Eigen::Index>(free.size())), given(static_cast<Eigen::Index>(held.size()));
+    for (std::size_t i = 0; i < free.size(); ++i) right[static_cast<Eigen::Index>(i)] = b[free[i]][axis];
+    for (std::size_t i = 0; i < held.size(); ++i) given[static_cast<Eigen::Index>(i)] = x[held[i]][axis];
+    const Vector expected = inner.ldlt().solve(right - outer * given);
+    for (std::size_t i = 0; i < free.size(); ++i)
+      EXPECT_NEAR(x[free[i]][axis], expected[static_cast<Eigen::Index>(i)], 1e-9) << free[i];
+  }
 }
 
 }  // namespace

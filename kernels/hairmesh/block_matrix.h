@@ -117,16 +117,16 @@ class BlockMatrix {
     Octets<T> one{}, two{};  // those of the two rows before, or after
     lanes_.read_rows(g, [&](std::int32_t i, Octets<T> w) {
       const Octets<T>* block = blocks + i * kRowOctets;
-      if (i > 1) w = less_transposes_times(w, block + 3 * kTwice, two);
-      if (i > 0) w = less_transposes_times(w, block + 3 * kOnce, one);
+      if (i > 1) w = less_transpose_times(w, block + 3 * kTwice, two);
+      if (i > 0) w = less_transpose_times(w, block + 3 * kOnce, one);
       two = one, one = w;
-      solved[i] = blocks_times(block + 3 * kInverse, w);
+      solved[i] = block_times(block + 3 * kInverse, w);
     });
     lanes_.write_rows(x, [&](std::int32_t i) {
       const Octets<T>* block = blocks + i * kRowOctets;
       Octets<T> value = solved[i];
-      if (i + 2 < rows) value = less_blocks_times(value, block + 2 * kRowOctets + 3 * kTwice, two);
-      if (i + 1 < rows) value = less_blocks_times(value, block + kRowOctets + 3 * kOnce, one);
+      if (i + 2 < rows) value = less_block_times(value, block + 2 * kRowOctets + 3 * kTwice, two);
+      if (i + 1 < rows) value = less_block_times(value, block + kRowOctets + 3 * kOnce, one);
       two = one, one = value;
       return value;
     });
@@ -189,11 +189,11 @@ class BlockMatrix {
     Octets<T> one{}, two{};
     for (std::int32_t i = 0; i < rows; ++i) sums[i] = Octets<T>{};
     lanes_.read_rows(x, [&](std::int32_t i, Octets<T> a) {
-      sums[i] += blocks_times(block(i, 0), a);
+      sums[i] += block_times(block(i, 0), a);
       if (i > 0)
-        sums[i - 1] += blocks_times(block(i - 1, 1), a), sums[i] += transposes_times(block(i - 1, 1), one);
+        sums[i - 1] += block_times(block(i - 1, 1), a), sums[i] += transpose_times(block(i - 1, 1), one);
       if (i > 1)
-        sums[i - 2] += blocks_times(block(i - 2, 2), a), sums[i] += transposes_times(block(i - 2, 2), two);
+        sums[i - 2] += block_times(block(i - 2, 2), a), sums[i] += transpose_times(block(i - 2, 2), two);
       two = one, one = a;
     });
     auto* products = reinterpret_cast<Octets<T>*>(products_.data());

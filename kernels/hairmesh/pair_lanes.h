@@ -5,6 +5,7 @@
 // alike, without shuffles. Lanes past a column's end hold 0, and so do those of a column that is not there.
 #pragma once
 #include "kernels/hairmesh/hair_mesh_elements.h"
+#include "kernels/hairmesh/halves.h"
 #include "kernels/hairmesh/vertex_filter.h"
 
 namespace ringlet::kernels {
@@ -17,41 +18,6 @@ inline constexpr std::int32_t kSecondHalf = 4, kFourReals = 3 * kOctet;
 template <class T>
 RINGLET_KERNEL Padded<T> four_at(const T* lanes) {
   return *reinterpret_cast<const Padded<T>*>(lanes);
-}
-
-// Of each half: its lanes moved up by one, the first from the end of `before`; down by one, the last from the
-// start of `after`.
-template <class V>
-RINGLET_KERNEL V shift_up(V before, V a) {
-  return __builtin_shufflevector(before, a, 3, 8, 9, 10, 7, 12, 13, 14);
-}
-template <class V>
-RINGLET_KERNEL V shift_down(V a, V after) {
-  return __builtin_shufflevector(a, after, 1, 2, 3, 8, 5, 6, 7, 12);
-}
-
-// The vertices of four rows, each row's two side by side, from their components, and back.
-template <class V>
-RINGLET_KERNEL void to_vertices(const V* lanes, V (&vertex)[4]) {
-  const V x = lanes[0], y = lanes[1], z = lanes[2], none{};
-  const V low = __builtin_shufflevector(x, y, 0, 8, 1, 9, 4, 12, 5, 13),
-          high = __builtin_shufflevector(x, y, 2, 10, 3, 11, 6, 14, 7, 15),
-          low_z = __builtin_shufflevector(z, none, 0, 8, 1, 9, 4, 12, 5, 13),
-          high_z = __builtin_shufflevector(z, none, 2, 10, 3, 11, 6, 14, 7, 15);
-  vertex[0] = __builtin_shufflevector(low, low_z, 0, 1, 8, 9, 4, 5, 12, 13);
-  vertex[1] = __builtin_shufflevector(low, low_z, 2, 3, 10, 11, 6, 7, 14, 15);
-  vertex[2] = __builtin_shufflevector(high, high_z, 0, 1, 8, 9, 4, 5, 12, 13);
-  vertex[3] = __builtin_shufflevector(high, high_z, 2, 3, 10, 11, 6, 7, 14, 15);
-}
-template <class V>
-RINGLET_KERNEL void to_components(const V (&vertex)[4], V* lanes) {
-  const V low = __builtin_shufflevector(vertex[0], vertex[1], 0, 8, 1, 9, 4, 12, 5, 13),
-          high = __builtin_shufflevector(vertex[2], vertex[3], 0, 8, 1, 9, 4, 12, 5, 13),
-          low_z = __builtin_shufflevector(vertex[0], vertex[1], 2, 10, 3, 11, 6, 14, 7, 15),
-          high_z = __builtin_shufflevector(vertex[2], vertex[3], 2, 10, 3, 11, 6, 14, 7, 15);
-  lanes[0] = __builtin_shufflevector(low, high, 0, 1, 8, 9, 4, 5, 12, 13);
-  lanes[1] = __builtin_shufflevector(low, high, 2, 3, 10, 11, 6, 7, 14, 15);
-  lanes[2] = __builtin_shufflevector(low_z, high_z, 0, 1, 8, 9, 4, 5, 12, 13);
 }
 
 // Which lanes are whose.

@@ -1,7 +1,7 @@
 // What is prescribed of a solve's unknowns (Baraff and Witkin 1998, section 5.2): nothing of a vertex, one
 // direction, or all of it. S takes what is prescribed out of a vertex's value.
 #pragma once
-#include "kernels/hairmesh/padded_vector.h"
+#include "kernels/hairmesh/halves.h"
 
 namespace ringlet::kernels {
 inline namespace RINGLET_ISA {

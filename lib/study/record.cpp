@@ -147,7 +147,10 @@ Out answers_json(const Study& study) {
 
 // `stages`: in the order they run, which `json` has lost.
 void read_row(const Json& json, const Out& stages, Row& row) {
-  row.status = json["status"] == "ok" ? Status::kOk : Status::kDiverged;
+  const std::string status = json["status"];
+  row.status = status == to_string(Status::kOk)        ? Status::kOk
+               : status == to_string(Status::kRefused) ? Status::kRefused
+                                                       : Status::kDiverged;
   row.message = json.value("message", "");
   if (!json["ms_per_frame"].is_null()) {
     Timed& timed = row.timed.emplace();
@@ -232,7 +235,17 @@ void expect_identity(const Json& found, const Json& expected, const std::string&
 }  // namespace
 
 const char* to_string(Status status) {
-  return status == Status::kOk ? "ok" : status == Status::kDiverged ? "diverged" : "not run";
+  switch (status) {
+    case Status::kOk:
+      return "ok";
+    case Status::kDiverged:
+      return "diverged";
+    case Status::kRefused:
+      return "refused";
+    case Status::kNew:
+      break;
+  }
+  return "not run";
 }
 
 std::string to_json(const Study& study) {

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "study/penetration.h"
+#include "study/record.h"
 
 namespace ringlet::study {
 namespace {
@@ -158,8 +159,8 @@ class Page {
 
   void run(const Row& r) {
     if (r.status == Status::kNew) return;
-    if (r.status == Status::kDiverged) {
-      say("| {} | diverged: {} | | | | | | |", code(r.label), r.message);
+    if (r.status != Status::kOk) {
+      say("| {} | {}: {} | | | | | | |", code(r.label), to_string(r.status), r.message);
       return;
     }
     std::string line = fmt::format("| {} | {} ", code(r.label),
@@ -339,10 +340,10 @@ std::string table(const Study& study) {
                        row.timed ? fmt::format("{:.4g}", row.timed->milliseconds) : "-",
                        cell(rms(row.measured.errors.position), "{:.2e}"),
                        cell(p99(row.measured.errors.position), "{:.2e}"),
-                       row.status == Status::kDiverged ? "diverged"
-                       : answers.knee == k             ? "front, knee"
-                       : front                         ? "front"
-                                                       : "");
+                       row.status != Status::kOk ? to_string(row.status)
+                       : answers.knee == k       ? "front, knee"
+                       : front                   ? "front"
+                                                 : "");
   }
   return out;
 }

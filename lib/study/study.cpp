@@ -89,8 +89,7 @@ class Running {
     std::vector<std::string> overrides = options.base.overrides;
     overrides.insert(overrides.end(), settings.begin(), settings.end());
     scene::load(options.base.file, {overrides, "--reference"});
-    for (std::size_t k = 0; k < variants_.size(); ++k)
-      if (study_.rows[k].status == Status::kNew) rehearse(variants_[k]);
+    rehearse_rows();
   }
 
   Study run() {
@@ -139,6 +138,33 @@ class Running {
     study_.has_grid =
         has_grid(base) || std::any_of(variants_.begin(), variants_.end(),
                                       [&](const Variant& variant) { return has_grid(variant.scene); });
+  }
+
+  // What is wrong with a run is told before any begins. A combination that is refused, of values that other
+  // runs take, is a row that says so.
+  void rehearse_rows() {
+    std::vector<std::optional<Error>> refusals(variants_.size());
+    for (std::size_t k = 0; k < variants_.size(); ++k) {
+      if (study_.rows[k].status != Status::kNew) continue;
+      try {
+        rehearse(variants_[k]);
+      } catch (const Error& error) {
+        if (error.kind() != ErrorKind::kInput) throw;
+        study_.rows[k].status = Status::kRefused, study_.rows[k].message = error.what();
+        refusals[k] = error;
+      }
+    }
+    for (std::size_t k = 0; k < variants_.size(); ++k) {
+      if (!refusals[k]) continue;
+      for (std::size_t a = 0; a < study_.axes.size(); ++a)
+        if (!taken_by_another(a, study_.rows[k].columns[a])) throw *refusals[k];
+      log_warning(fmt::format("{} is left out: {}", study_.rows[k].label, study_.rows[k].message));
+    }
+  }
+  bool taken_by_another(std::size_t axis, const std::string& value) const {
+    return std::any_of(study_.rows.begin(), study_.rows.end(), [&](const Row& row) {
+      return row.status != Status::kRefused && row.columns[axis] == value;
+    });
   }
 
   void look_at_what_is_there() {
@@ -210,7 +236,7 @@ class Running {
   bool finish_row(std::size_t k) {
     Row& row = study_.rows[k];
     const Variant& variant = variants_[k];
-    if (row.status == Status::kDiverged) return true;
+    if (row.status == Status::kDiverged || row.status == Status::kRefused) return true;
     if (row.reference_substeps != reference_->substeps()) {
       const int substeps = reference_->substeps();
       const cache::CacheReader reader(reference_->cache());

@@ -26,7 +26,8 @@ struct Options {
   std::function<void(const std::string&)> tell;  // after each run, a line for people
 };
 
-enum class Status { kNew, kOk, kDiverged };
+// kRefused: its values do not go together, though each goes with others.
+enum class Status { kNew, kOk, kDiverged, kRefused };
 
 struct Row {
   std::string label, key;

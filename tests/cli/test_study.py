@@ -305,6 +305,21 @@ def test_a_run_that_diverges_is_a_row(program, scene, tmp_path):
     assert "diverged" in (tmp_path / "study" / "report.md").read_text()
 
 
+def test_a_combination_that_is_refused_is_a_row(program, scene, tmp_path):
+    stiff = ("--vary", "/model/stiffness/edge=2000,1e10")
+    out = tmp_path / "study"
+    told, rows = study(program, scene, out, *QUICK, "--product", *stiff, "--vary", "precision=float,double")
+    assert [row["status"] for row in rows] == ["ok", "ok", "refused", "ok"]
+    assert rows[2]["ms_per_frame"] == "" and "single precision" in told["rows"][2]["message"]
+    assert "refused" in (out / "report.md").read_text()
+    again, _ = study(program, scene, out, "--resume", *QUICK, "--product", *stiff, "--vary", "precision=float,double")
+    assert again["rows"] == told["rows"]
+    # A value that no run takes is a mistake.
+    result = run(program, "study", scene, "-o", tmp_path / "other", *QUICK, *stiff)
+    assert result.returncode == 3 and "1e+10" in result.stderr
+    assert not (tmp_path / "other").exists()
+
+
 def test_without_a_reference_there_is_no_study(program, scene, tmp_path):
     options = (*QUICK, "--set", "/limits/speed=1e-3", "--vary", "threads=1")
     for cap, message in (("1000", "reference: it diverges whatever its substeps"), ("4", "reference: there is nothing to measure against: frame 2")):

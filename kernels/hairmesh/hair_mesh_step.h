@@ -105,7 +105,8 @@ class MeshStepper final : public HairMeshSolver<T> {
         gradients_.solve(matrix_, filter_, tolerance_, iterations_, vectors(impulse_), vectors(change_));
     for (int round = 0; round < kMostRounds && stop_turned(); ++round) {
       const SolveFigures more =
-          gradients_.solve_on(matrix_, filter_, tolerance_, iterations_, vectors(impulse_), vectors(change_));
+          gradients_.solve_on(matrix_, filter_, tolerance_, iterations_ - figures.iterations,
+                              vectors(impulse_), vectors(change_));
       figures.iterations += more.iterations;
       if (!(more.residual <= figures.residual)) figures.residual = more.residual;
     }

@@ -54,12 +54,18 @@ RINGLET_KERNEL auto dot_product(V a, V b) {
   return products[0] + products[1] + products[2];
 }
 
-// The inverse of a symmetric positive definite block.
+// The inverse of a symmetric positive definite block, from its factors L E L^T. By cofactors it would lose
+// twice the digits where a block is much stiffer along one direction than across.
 template <class V>
 RINGLET_KERNEL void invert(const V (&a)[3], V (&to)[3]) {
-  const V x = cross_product(a[1], a[2]);
-  const V scale = 1 / dot_product(a[0], x) - V{};
-  to[0] = scale * x, to[1] = scale * cross_product(a[2], a[0]), to[2] = scale * cross_product(a[0], a[1]);
+  const auto e0 = 1 / a[0][0], yx = a[0][1] * e0, zx = a[0][2] * e0;  // L's entries, by row and column
+  const auto e1 = 1 / (a[1][1] - yx * a[0][1]), left = a[1][2] - yx * a[0][2], zy = left * e1;
+  const auto e2 = 1 / (a[2][2] - zx * a[0][2] - zy * left);
+  const auto back = yx * zy - zx;  // of L^-1 the entry that is not one of -L
+  const auto xy = -(yx * e1) - back * (zy * e2), xz = back * e2, yz = -(zy * e2);
+  to[0] = V{e0 + yx * (yx * e1) + back * (back * e2), xy, xz, 0};
+  to[1] = V{xy, e1 + zy * (zy * e2), yz, 0};
+  to[2] = V{xz, yz, e2, 0};
 }
 
 }  // namespace RINGLET_ISA

@@ -13,8 +13,9 @@ namespace ringlet::groom {
 
 namespace {
 
-constexpr std::size_t kMostProblems = 8;  // told in full; of the others the number
-constexpr double kFlat = 1e-12;           // relative to the size of what should have an extent
+constexpr std::size_t kMostProblems = 8;          // told in full; of the others the number
+constexpr std::size_t kMostVertices = 1'500'000;  // so many blocks can be numbered
+constexpr double kFlat = 1e-12;                   // relative to the size of what should have an extent
 
 class Checker {
  public:
@@ -58,7 +59,11 @@ class Checker {
 
   void check_arrays() {
     if (mesh_.layers < 2)
-      add(fmt::format("has {} layers, expected 2 or more", mesh_.layers), "layer 0 is the scalp's");
+      add(fmt::format("has {} layer{}, expected 2 or more", mesh_.layers, mesh_.layers == 1 ? "" : "s"),
+          "layer 0 is the scalp's");
+    if (mesh_.positions.size() > kMostVertices)
+      add(fmt::format("has {} vertices, expected {} or fewer", mesh_.positions.size(), kMostVertices),
+          "a hair mesh is coarse, its strands are not");
     if (mesh_.faces.empty()) add("the scalp has no faces", "give triangles or quads");
     if (mesh_.layers > 0 && mesh_.positions.size() % mesh_.layers != 0)
       add(fmt::format("{} positions are not so many on each of {} layers", mesh_.positions.size(),

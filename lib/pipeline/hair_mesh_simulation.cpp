@@ -100,6 +100,8 @@ class HairMeshSimulation : public Simulation {
   void make_plan(std::int64_t strands, std::int64_t particles);
   std::size_t bytes_of_tries() const;
   void step_frame(int frame);
+  double largest_residual() const { return std::max(taken_.residual, taken_.minimise_residual); }
+  bool stopped_short() const;
   void warn_of_residual(int frame);
   void take_frame(int frame, int substeps);
   std::vector<double> vertices() const;
@@ -110,6 +112,8 @@ class HairMeshSimulation : public Simulation {
   Pose head_at(double time) const;
   Pose carrier(const scene::Ellipsoid& ellipsoid, const Pose& head, double time) const;
   void check(const char* stage, int frame);
+  void check_residual(const char* stage, int frame);
+  std::string precision_hint() const;
   [[noreturn]] void tell(const char* stage, int frame, std::size_t part,
                          const hairmesh::MeshDivergence& diverged);
   state::Frame frame_now(int frame);
@@ -344,9 +348,29 @@ void HairMeshSimulation<T>::check(const char* stage, int frame) {
     if (const auto diverged = parts_[k].body.diverged(scene_.limits)) tell(stage, frame, k, *diverged);
     if (const auto contact = parts_[k].body.bad_contact()) tell(stage, frame, k, *contact);
   }
-  if (!std::isfinite(taken_.residual) || !std::isfinite(taken_.minimise_residual))
-    throw Diverged(frame_now(frame), stage, parts_[0].first_strand, -1,
-                   "the simulation diverged: a hair mesh's solve has no finite residual");
+  check_residual(stage, frame);
+}
+
+// One that has stopped no nearer than it began has solved nothing.
+template <class T>
+void HairMeshSimulation<T>::check_residual(const char* stage, int frame) {
+  const double left = largest_residual();
+  const bool finite = std::isfinite(taken_.residual) && std::isfinite(taken_.minimise_residual),
+             stalled = left >= 1 && taken_.iterations < scene_.model.hair_mesh->max_iterations;
+  if (finite && !stalled) return;
+  throw Diverged(frame_now(frame), stage, parts_[0].first_strand, -1,
+                 "the simulation diverged: a hair mesh's solve has " +
+                     (finite ? fmt::format("stopped at a relative residual of {:.2g}", left)
+                             : std::string("no finite residual")) +
+                     precision_hint());
+}
+
+// Where single precision has not told the system well enough.
+template <class T>
+std::string HairMeshSimulation<T>::precision_hint() const {
+  return std::is_same_v<T, float> && (warned_ || stopped_short())
+             ? "; double precision solves what single cannot"
+             : "";
 }
 
 // The particle: that which moves most with the vertex at rest, if one does.
@@ -366,12 +390,13 @@ void HairMeshSimulation<T>::tell(const char* stage, int frame, std::size_t k,
       most = way, at = static_cast<std::int64_t>(i);
   const std::int64_t strand = parts_[k].first_strand + std::max<std::int64_t>(at, 0) / strands.points(),
                      particle = at < 0 ? -1 : at % strands.points();
+  const std::string hair = at < 0 ? "" : fmt::format(", strand {}, particle {}", strand, particle);
   throw Diverged(
       frame_now(frame), stage, strand, particle,
-      fmt::format("the simulation diverged in stage `{}`: groom `{}`, vertex {} of layer {} of its hair "
-                  "mesh, strand {}, particle {}: {}",
-                  stage, scene_.grooms[k].name, diverged.column, diverged.layer, strand, particle,
-                  diverged.what));
+      fmt::format("the simulation diverged in stage `{}`: groom `{}`, vertex {} of layer {} of its "
+                  "hair mesh{}: {}{}",
+                  stage, scene_.grooms[k].name, diverged.column, diverged.layer, hair, diverged.what,
+                  precision_hint()));
 }
 
 template <class T>
@@ -445,17 +470,21 @@ void HairMeshSimulation<T>::set_state(const state::Snapshot& snapshot) {
     parts_[k].body.restore(snapshot, k == 0 ? "" : fmt::format("_{}", k));
 }
 
+// By more than rounding.
+template <class T>
+bool HairMeshSimulation<T>::stopped_short() const {
+  return largest_residual() > 2 * scene_.model.hair_mesh->residual;
+}
+
 // Once: the figures tell of every frame.
 template <class T>
 void HairMeshSimulation<T>::warn_of_residual(int frame) {
-  const scene::HairMeshModel& model = *scene_.model.hair_mesh;
-  const double left = std::max(taken_.residual, taken_.minimise_residual);
-  if (warned_ || !(left > 2 * model.residual)) return;  // not of rounding
+  if (warned_ || !stopped_short()) return;
   warned_ = true;
   log_warning(fmt::format(
       "frame {}: a hair mesh's solve stopped at a relative residual of {:.2g}, {:g} was asked for "
       "(more max_iterations, softer springs, or double precision)",
-      frame, left, model.residual));
+      frame, largest_residual(), scene_.model.hair_mesh->residual));
 }
 
 template <class T>

@@ -135,7 +135,7 @@ TEST(HairMeshBadObj, StatementsHaveTheirLine) {
 
 TEST(HairMeshBadObj, LayersOfDifferentTopology) {
   const auto error = [](const std::string& more) { return read_error("a.obj", kScalp + more); };
-  EXPECT_THAT(error(""), HasSubstr("has 1 layers, expected 2 or more"));
+  EXPECT_THAT(error(""), HasSubstr("has 1 layer, expected 2 or more"));
   EXPECT_THAT(error("o b\nv 0 0 1\nv 1 0 1\nv 0 1 1\n"),
               HasSubstr("a.obj:6: layer 1 (object b) has no faces"));
   EXPECT_THAT(error("o b\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\nf 4 5 6\n"),

@@ -78,7 +78,7 @@ TEST(HairMesh, WholeMeshesPass) {
 TEST(HairMesh, ArraysAndIndices) {
   HairMesh mesh = slab(2, 1, 2, 1, 1);
   mesh.layers = 1;
-  EXPECT_THAT(refusal(mesh), HasSubstr("mesh: has 1 layers, expected 2 or more"));
+  EXPECT_THAT(refusal(mesh), HasSubstr("mesh: has 1 layer, expected 2 or more"));
   mesh = slab(2, 1, 2, 1, 1);
   mesh.positions.pop_back();
   EXPECT_THAT(refusal(mesh), HasSubstr("11 positions are not so many on each of 2 layers"));

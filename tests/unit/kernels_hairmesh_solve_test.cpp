@@ -44,6 +44,11 @@ struct Solve {
   }
 };
 
+template <class T>
+class HairMeshFineLayers : public testing::Test {};
+using Precisions = testing::Types<float, double>;
+TYPED_TEST_SUITE(HairMeshFineLayers, Precisions);
+
 // Rows of free vertices.
 Matrix dense(MeshStepper<double>& solver, const HairMeshTopology& t, const std::vector<int>& rows) {
   const auto count = static_cast<Eigen::Index>(rows.size());
@@ -134,6 +139,46 @@ TEST(HairMeshSolve, ReachesItsToleranceInFloat) {
       run.frame();
       EXPECT_LE(run.solved.residual, 1e-4) << vertices << " frame " << frame;
       EXPECT_LE(run.solved.iterations, 100) << vertices;
+    }
+  }
+}
+
+// Blocks that are much stiffer along one direction than across, as those of short segments are.
+TEST(HairMeshSolve, InvertsStiffBlocksAsWellAsTheyAreKnown) {
+  std::mt19937 engine(5);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  for (const double ratio : {1.0, 1e2, 1e4, 1e6})
+    for (int k = 0; k < 100; ++k) {
+      const Eigen::Vector3f n =
+          Eigen::Vector3d(uniform(engine), uniform(engine), uniform(engine)).normalized().cast<float>();
+      const Eigen::Matrix3f a = Eigen::Matrix3f::Identity() + static_cast<float>(ratio) * n * n.transpose();
+      Padded<float> block[3], inverse[3];
+      for (int c = 0; c < 3; ++c) block[c] = Padded<float>{a(0, c), a(1, c), a(2, c), 0};
+      kernels::invert(block, inverse);
+      const Eigen::Matrix3d expected = a.cast<double>().inverse();
+      double error = 0;
+      for (int c = 0; c < 3; ++c)
+        for (int r = 0; r < 3; ++r) {
+          error = std::max(error, std::abs(inverse[c][r] - expected(r, c)));
+          EXPECT_EQ(inverse[c][r], inverse[r][c]);
+        }
+      EXPECT_LE(error, 4e-7 * (1 + ratio) * expected.cwiseAbs().maxCoeff()) << ratio;
+    }
+}
+
+// Layers far finer than columns are apart: segments so stiff that rounding the solution to single precision
+// leaves more than is asked for.
+TYPED_TEST(HairMeshFineLayers, ReachTheirResidual) {
+  for (const int layers : {30, 60}) {
+    MeshRun<TypeParam> run(hair_cap({6, 12}, layers, 0.02, 0.1));
+    run.set();
+    for (int frame = 1; frame <= 12; ++frame) {
+      run.head(Eigen::AngleAxisd(0.3 * std::sin(0.4 * frame), Eigen::Vector3d::UnitY()).toRotationMatrix(),
+               Eigen::Vector3d(0.03 * std::sin(0.5 * frame), 0, 0));
+      run.frame();
+      const double bound = std::is_same_v<TypeParam, float> ? 1e-2 : 1e-4;
+      EXPECT_LE(run.solved.residual, bound) << layers << " layers, frame " << frame;
+      EXPECT_LE(run.solved.iterations, 100) << layers << " layers, frame " << frame;
     }
   }
 }

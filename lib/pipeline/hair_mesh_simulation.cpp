@@ -100,7 +100,12 @@ class HairMeshSimulation : public Simulation {
   void make_plan(std::int64_t strands, std::int64_t particles);
   std::size_t bytes_of_tries() const;
   void step_frame(int frame);
-  double largest_residual() const { return std::max(taken_.residual, taken_.minimise_residual); }
+  // Not a number where one of them is none.
+  double largest_residual() const {
+    return taken_.minimise_residual <= taken_.residual   ? taken_.residual
+           : taken_.residual <= taken_.minimise_residual ? taken_.minimise_residual
+                                                         : std::nan("");
+  }
   bool stopped_short() const;
   void warn_of_residual(int frame);
   void take_frame(int frame, int substeps);
@@ -355,7 +360,7 @@ void HairMeshSimulation<T>::check(const char* stage, int frame) {
 template <class T>
 void HairMeshSimulation<T>::check_residual(const char* stage, int frame) {
   const double left = largest_residual();
-  const bool finite = std::isfinite(taken_.residual) && std::isfinite(taken_.minimise_residual),
+  const bool finite = std::isfinite(left),
              stalled = left >= 1 && taken_.iterations < scene_.model.hair_mesh->max_iterations;
   if (finite && !stalled) return;
   throw Diverged(frame_now(frame), stage, parts_[0].first_strand, -1,
@@ -473,7 +478,7 @@ void HairMeshSimulation<T>::set_state(const state::Snapshot& snapshot) {
 // By more than rounding.
 template <class T>
 bool HairMeshSimulation<T>::stopped_short() const {
-  return largest_residual() > 2 * scene_.model.hair_mesh->residual;
+  return !(largest_residual() <= 2 * scene_.model.hair_mesh->residual);
 }
 
 // Once: the figures tell of every frame.

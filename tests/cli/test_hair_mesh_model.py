@@ -80,6 +80,16 @@ def test_a_solve_that_is_cut_short_is_told_once(program, scene, tmp_path):
     assert figures(tmp_path / "out", "mesh_residual").max() > 1e-4
 
 
+@pytest.mark.parametrize("stretch", ["1e8", "1e10"])
+def test_stiffness_that_single_precision_cannot_solve_is_told(program, scene, tmp_path, stretch):
+    options = ["-o", tmp_path / "out", "--overwrite", f"--set=/model/hair_mesh/stretch={stretch}"]
+    result = run(program, "run", scene, *options, "--precision=float")
+    assert result.returncode == 4 and "double precision solves" in result.stderr
+    assert "particle -1" not in result.stderr
+    steps(program, scene, tmp_path / "double", "--precision=double", *options[3:])
+    assert figures(tmp_path / "double", "mesh_residual").max() <= 1e-4
+
+
 def test_velocities_are_those_of_the_way(program, scene, tmp_path):
     out = tmp_path / "out"
     steps(program, scene, out, '--set=/cache/fields=["position", "velocity"]', "--set=/effects/solids=[]")

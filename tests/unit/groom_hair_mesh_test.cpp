@@ -80,6 +80,9 @@ TEST(HairMesh, ArraysAndIndices) {
   mesh.layers = 1;
   EXPECT_THAT(refusal(mesh), HasSubstr("mesh: has 1 layer, expected 2 or more"));
   mesh = slab(2, 1, 2, 1, 1);
+  mesh.positions.resize(1'500'002);
+  EXPECT_THAT(refusal(mesh), HasSubstr("has 1500002 vertices, expected 1500000 or fewer"));
+  mesh = slab(2, 1, 2, 1, 1);
   mesh.positions.pop_back();
   EXPECT_THAT(refusal(mesh), HasSubstr("11 positions are not so many on each of 2 layers"));
   mesh = slab(2, 1, 2, 1, 1);

@@ -107,6 +107,7 @@ void Body<T>::start(std::span<const Pose> roots) {
     }
   std::fill(velocities_.begin(), velocities_.end(), Vec3::Zero());
   hand_over();
+  fetch();  // as the solver rounds them: a run that begins anew from here sees no others
 }
 
 template <class T>

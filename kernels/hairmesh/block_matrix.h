@@ -222,8 +222,8 @@ class BlockMatrix {
   }
   // One after the other: both may be the same column.
   static RINGLET_KERNEL void add_two(T* to, const std::int32_t* other, int c, Octets<T> a) {
-    *reinterpret_cast<Padded<T>*>(to + other[0] + kOctet * c) += first_half<T>(a);
-    *reinterpret_cast<Padded<T>*>(to + other[1] + kOctet * c) += second_half<T>(a);
+    *reinterpret_cast<Padded<T>*>(to + other[0] + kOctet * c) += half_of<0, T>(a);
+    *reinterpret_cast<Padded<T>*>(to + other[1] + kOctet * c) += half_of<1, T>(a);
   }
   static RINGLET_KERNEL void add_product(const Octets<T>* block, const Octets<T> (&x)[3], Octets<T> (&y)[3]) {
     for (int c = 0; c < 3; ++c)

@@ -4,7 +4,6 @@
 #pragma once
 #include <algorithm>
 #include <cstdint>
-#include <numeric>
 #include <vector>
 
 #include "kernels/hairmesh/hair_mesh_elements.h"
@@ -16,22 +15,21 @@ namespace ringlet::kernels {
 class ColumnOrder {
  public:
   // `coupled[c]`: the columns that c may be coupled with, ascending.
-  explicit ColumnOrder(const std::vector<std::vector<std::int32_t>>& coupled) : place_(coupled.size()) {
-    std::vector<std::int32_t> left(coupled.size());
-    std::iota(left.begin(), left.end(), 0);
-    const auto take = [&](auto of, int half) {
-      const std::int32_t column = *of;
-      left.erase(of);
-      place_[static_cast<std::size_t>(column)] = static_cast<std::int32_t>(2 * pairs_.size()) + half;
-      return column;
-    };
-    while (!left.empty()) {
-      ColumnPair pair{{take(left.begin(), 0), static_cast<std::int32_t>(coupled.size())}};
-      const auto& of = coupled[static_cast<std::size_t>(pair.column[0])];
-      const auto partner = std::find_if_not(left.begin(), left.end(), [&](std::int32_t c) {
-        return std::binary_search(of.begin(), of.end(), c);
-      });
-      if (partner != left.end()) pair.column[1] = take(partner, 1);
+  explicit ColumnOrder(const std::vector<std::vector<std::int32_t>>& coupled)
+      : place_(coupled.size(), kNone) {
+    const auto columns = static_cast<std::int32_t>(coupled.size());
+    for (std::int32_t first = 0; first < columns; ++first) {
+      if (place(first) != kNone) continue;
+      const auto& of = coupled[static_cast<std::size_t>(first)];
+      std::int32_t partner = first + 1;
+      while (partner < columns &&
+             (place(partner) != kNone || std::binary_search(of.begin(), of.end(), partner)))
+        ++partner;
+      const ColumnPair pair{{first, partner}};
+      for (int half = 0; half < 2; ++half)
+        if (pair.column[half] < columns)
+          place_[static_cast<std::size_t>(pair.column[half])] =
+              static_cast<std::int32_t>(2 * pairs_.size()) + half;
       pairs_.push_back(pair);
     }
   }
@@ -42,6 +40,8 @@ class ColumnOrder {
   MeshArray<ColumnPair> pairs() const { return {pairs_.data(), static_cast<std::int32_t>(pairs_.size())}; }
 
  private:
+  static constexpr std::int32_t kNone = -1;
+
   std::vector<std::int32_t> place_;
   std::vector<ColumnPair> pairs_;
 };

@@ -16,8 +16,8 @@ template <class T>
 class MeshLaplacian {
  public:
   // `degree` counts a column's edges of the scalp; of their other ends `neighbour` holds the later columns.
-  MeshLaplacian(const PairLanes<T>& lanes, std::int32_t first_layer, const std::int32_t* degree,
-                const std::int32_t* first, const std::int32_t* neighbour)
+  MeshLaplacian(const PairLanes<T>& lanes, const std::int32_t* degree, const std::int32_t* first,
+                const std::int32_t* neighbour)
       : lanes_(lanes) {
     const auto pairs = static_cast<std::size_t>(lanes.pairs());
     zero_values(kOctet * pairs * static_cast<std::size_t>(lanes.fours()), degree_, joined_);
@@ -32,7 +32,7 @@ class MeshLaplacian {
         if (!lanes.is_column(c)) continue;
         for (std::int32_t n = first[c]; n < first[c + 1]; ++n) *offset++ = lanes.offset(neighbour[n]);
         for (std::int32_t row = 0; row < lanes.rows(); ++row) {
-          const bool has_below = row + first_layer > 0, has_above = row + 1 < lanes.rows();
+          const bool has_below = row + lanes.first_layer() > 0, has_above = row + 1 < lanes.rows();
           *lane(degree_, k, half, row) =
               static_cast<T>(degree[c] + (has_below ? 1 : 0) + (has_above ? 1 : 0));
           *lane(joined_, k, half, row) = has_above ? T(1) : T(0);
@@ -90,10 +90,10 @@ class MeshLaplacian {
   RINGLET_KERNEL void add_to_later(std::int32_t pair, const Octets<T>* x, T* to) const {
     const std::int32_t* first = first_.data() + 2 * pair;
     for (std::int32_t k = 0; k < lanes_.octets(); ++k) {
-      const Padded<T> half_of[2] = {first_half<T>(x[k]), second_half<T>(x[k])};
+      const Padded<T> halves[2] = {half_of<0, T>(x[k]), half_of<1, T>(x[k])};
       for (int half = 0; half < 2; ++half)
         for (std::int32_t n = first[half]; n < first[half + 1]; ++n)
-          *reinterpret_cast<Padded<T>*>(to + offset_.data()[n] + kOctet * k) -= half_of[half];
+          *reinterpret_cast<Padded<T>*>(to + offset_.data()[n] + kOctet * k) -= halves[half];
     }
   }
   RINGLET_KERNEL void add_own(std::int32_t pair, const Octets<T>* x, Octets<T>* y) const {

@@ -70,7 +70,7 @@ class FilteredConjugateGradients {
     return reinterpret_cast<Octets<T>*>(buffer.data());
   }
   static RINGLET_KERNEL T sum(Octets<T> lanes) {
-    const Padded<T> halves = first_half<T>(lanes) + second_half<T>(lanes);
+    const Padded<T> halves = half_of<0, T>(lanes) + half_of<1, T>(lanes);
     return (halves[0] + halves[1]) + (halves[2] + halves[3]);
   }
   template <class F>

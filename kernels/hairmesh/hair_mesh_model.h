@@ -38,6 +38,7 @@ class HairMeshModel {
       : mesh_(mesh),
         rest_(rest),
         parameters_(parameters),
+        passes_(passes()),
         pattern_(column_order(), mesh.columns, mesh.layers, parameters.held_roots) {
     tetrahedra_ = mesh_.corner_tetrahedra();
     measure_prisms();
@@ -90,7 +91,7 @@ class HairMeshModel {
     for (const ScalpFace& face : mesh_.faces)
       for (int i = 0; i < face.corners(); ++i)
         for (int j = 0; j < i; ++j) couple(face.corner[index(i)], face.corner[index(j)]);
-    for (const ScalpPass& pass : passes()) couple(pass.before, pass.after);
+    for (const ScalpPass& pass : passes_) couple(pass.before, pass.after);
     for (std::vector<std::int32_t>& others : beside) {
       std::sort(others.begin(), others.end());
       others.erase(std::unique(others.begin(), others.end()), others.end());
@@ -248,7 +249,7 @@ class HairMeshModel {
           }
         }
     if (!(parameters_.bend_across > 0)) return;
-    for (const ScalpPass& pass : passes())
+    for (const ScalpPass& pass : passes_)
       for (std::int32_t l = parameters_.held_roots ? 1 : 0; l < mesh_.layers; ++l) {
         const std::int32_t centre = mesh_.vertex(pass.centre, l);
         add_bend(mesh_.vertex(pass.before, l), centre, mesh_.vertex(pass.after, l),
@@ -375,6 +376,7 @@ class HairMeshModel {
   const HairMeshTopology mesh_;
   const std::vector<double> rest_;
   const HairMeshParameters parameters_;
+  const std::vector<ScalpPass> passes_;
   std::vector<CornerTetrahedron> tetrahedra_;
   double mean_length_ = 0;                            // of the extrusion's edges [m]
   std::vector<double> prism_volume_, vertex_volume_;  // [m^3]

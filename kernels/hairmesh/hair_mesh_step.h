@@ -50,7 +50,7 @@ class MeshStepper final : public HairMeshSolver<T> {
         surface_({mesh.surface.data, 4 * mesh.surface.count}),
         lanes_(columns_, layers_, mesh.pattern.first_layer, mesh.pattern.pairs),
         matrix_(mesh.pattern, lanes_),
-        laplacian_(lanes_, mesh.pattern.first_layer, mesh.degree, mesh.first_neighbour, mesh.neighbour),
+        laplacian_(lanes_, mesh.degree, mesh.first_neighbour, mesh.neighbour),
         filter_(columns_, layers_),
         gradients_(lanes_) {
     const auto count = static_cast<std::size_t>(vertices_);

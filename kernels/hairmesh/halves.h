@@ -49,19 +49,12 @@ RINGLET_KERNEL Octets<T> side_by_side(Padded<T> a, Padded<T> b) {
   else
     return __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7);
 }
-template <class T>
-RINGLET_KERNEL Padded<T> first_half(const Octets<T>& a) {
+template <int k, class T>
+RINGLET_KERNEL Padded<T> half_of(const Octets<T>& a) {
   if constexpr (std::is_same_v<Octets<T>, TwoHalves<T>>)
-    return a.half[0];
+    return a.half[k];
   else
-    return __builtin_shufflevector(a, a, 0, 1, 2, 3);
-}
-template <class T>
-RINGLET_KERNEL Padded<T> second_half(const Octets<T>& a) {
-  if constexpr (std::is_same_v<Octets<T>, TwoHalves<T>>)
-    return a.half[1];
-  else
-    return __builtin_shufflevector(a, a, 4, 5, 6, 7);
+    return __builtin_shufflevector(a, a, 4 * k, 4 * k + 1, 4 * k + 2, 4 * k + 3);
 }
 
 // Of each half: reals 0 to 3 are those of a's, 4 to 7 those of b's.

@@ -39,6 +39,7 @@ class PairLanes {
   const ColumnPair& pair(std::int32_t k) const { return pairs_.data()[k]; }
   bool is_column(std::int32_t c) const { return c < columns_; }
   std::int32_t place(std::int32_t column) const { return place_.data()[column]; }
+  std::int32_t first_layer() const { return first_layer_; }  // that has a row
   std::int32_t rows() const { return layers_ - first_layer_; }
   std::int32_t fours() const { return (rows() + 3) / 4; }
   std::int32_t first_vertex(std::int32_t column) const { return column * layers_ + first_layer_; }
@@ -96,8 +97,8 @@ class PairLanes {
     }
   }
   // S a in a pair
-  void keep(const VertexFilter<T>& filter, std::int32_t pair_of, T* lanes) const {
-    for (const std::int32_t c : pair(pair_of).column)
+  void keep(const VertexFilter<T>& filter, std::int32_t k, T* lanes) const {
+    for (const std::int32_t c : pair(k).column)
       if (is_column(c) && filter.touches(c))
         for_vertices(
             c, [&](std::int32_t v, std::int32_t at) { put(lanes + at, filter.keep(v, get(lanes + at))); });

@@ -251,7 +251,7 @@ TEST(HairMeshSolve, GoesOnFromWhatItHas) {
   const HairMeshModel<double> model(t, mesh.rest, {});
   const HairMeshView<double> view = model.view();
   const kernels::PairLanes<double> lanes(t.columns, t.layers, 1, view.pattern.pairs);
-  kernels::MeshLaplacian<double> laplacian(lanes, 1, view.degree, view.first_neighbour, view.neighbour);
+  kernels::MeshLaplacian<double> laplacian(lanes, view.degree, view.first_neighbour, view.neighbour);
   kernels::VertexFilter<double> filter(t.columns, t.layers);
   kernels::FilteredConjugateGradients<double> gradients(lanes);
   Matrix a = Matrix::Zero(t.vertices(), t.vertices());

@@ -52,13 +52,40 @@ RINGLET_KERNEL int append_lanes(std::int32_t* to, std::int32_t first, std::uint3
   return count;
 }
 
+// Writes from[lane] in the same way, which has room for kWidth values.
+template <int kWidth, class T>
+RINGLET_KERNEL int append_selected(T* to, const T* from, std::uint32_t bits) {
+  int count = 0;
+  for (int lane = 0; lane < kWidth; ++lane) to[count] = from[lane], count += bits >> lane & 1;
+  return count;
+}
+
 #if !defined(__CUDACC__)
+// The same for a pack.
+template <class T, int W>
+RINGLET_KERNEL int append_selected(T* to, Pack<T, W> from, std::uint32_t bits) {
+  alignas(64) T values[W];
+  from.store(values);
+  return append_selected<W>(to, values, bits);
+}
+
 #if defined(__AVX512F__)
 template <>
 RINGLET_KERNEL int append_lanes<16>(std::int32_t* to, std::int32_t first, std::uint32_t bits) {
   const __m512i lanes = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
   const __m512i numbers = _mm512_add_epi32(lanes, _mm512_set1_epi32(first));
   _mm512_storeu_si512(to, _mm512_maskz_compress_epi32(static_cast<__mmask16>(bits), numbers));
+  return __builtin_popcount(bits);
+}
+template <>
+RINGLET_KERNEL int append_selected<16>(std::int32_t* to, const std::int32_t* from, std::uint32_t bits) {
+  const __m512i values = _mm512_loadu_si512(from);
+  _mm512_storeu_si512(to, _mm512_maskz_compress_epi32(static_cast<__mmask16>(bits), values));
+  return __builtin_popcount(bits);
+}
+template <>
+RINGLET_KERNEL int append_selected(float* to, Pack<float, 16> from, std::uint32_t bits) {
+  _mm512_storeu_ps(to, _mm512_maskz_compress_ps(static_cast<__mmask16>(bits), __m512(from.v)));
   return __builtin_popcount(bits);
 }
 #elif defined(__AVX2__)
@@ -78,6 +105,21 @@ RINGLET_KERNEL int append_lanes<8>(std::int32_t* to, std::int32_t first, std::ui
   const __m128i bytes = _mm_cvtsi64_si128(static_cast<long long>(kLaneNumbers.of[bits]));
   const __m256i numbers = _mm256_add_epi32(_mm256_cvtepu8_epi32(bytes), _mm256_set1_epi32(first));
   _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), numbers);
+  return __builtin_popcount(bits);
+}
+RINGLET_KERNEL __m256i selected_first(__m256i values, std::uint32_t bits) {
+  const __m128i bytes = _mm_cvtsi64_si128(static_cast<long long>(kLaneNumbers.of[bits]));
+  return _mm256_permutevar8x32_epi32(values, _mm256_cvtepu8_epi32(bytes));
+}
+template <>
+RINGLET_KERNEL int append_selected<8>(std::int32_t* to, const std::int32_t* from, std::uint32_t bits) {
+  const __m256i values = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(from));
+  _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), selected_first(values, bits));
+  return __builtin_popcount(bits);
+}
+template <>
+RINGLET_KERNEL int append_selected(float* to, Pack<float, 8> from, std::uint32_t bits) {
+  _mm256_storeu_ps(to, _mm256_castsi256_ps(selected_first(_mm256_castps_si256(__m256(from.v)), bits)));
   return __builtin_popcount(bits);
 }
 #endif

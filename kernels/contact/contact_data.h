@@ -79,6 +79,9 @@ struct PackOfPairs {
         b_start(gather_segment<R>(places.start, other)),
         a(gather_segment<R>(places.end, one)),
         b(gather_segment<R>(places.end, other)) {}
+  RINGLET_KERNEL PackOfPairs(const GatheredSegment<R>& one_start, const GatheredSegment<R>& other_start,
+                             const GatheredSegment<R>& one, const GatheredSegment<R>& other)
+      : a_start(one_start), b_start(other_start), a(one), b(other) {}
   // Sum of the radii where they are largest [m].
   RINGLET_KERNEL R largest_reach() const {
     return max(a.begin_extra, a.end_extra) + max(b.begin_extra, b.end_extra);

@@ -24,7 +24,6 @@ struct ContactPairs {
   const signed char* side;    // [pairs] see find_contact
   ContactRecord<T>* record;   // [pairs]
   unsigned char* active;      // [pairs]
-  std::int32_t* contacts;     // [particles] of the segment
   std::int32_t count;
 };
 
@@ -77,8 +76,6 @@ struct FindContacts {
                                     {lanes[5][lane], lanes[6][lane], lanes[7][lane]},
                                     lanes[8][lane]};
       if (crossed >> lane & 1) pairs.active[first + lane] = 2;
-      atomic_add(&pairs.contacts[pairs.a[first + lane]], 1);
-      atomic_add(&pairs.contacts[pairs.b[first + lane]], 1);
     }
   }
 };
@@ -125,8 +122,9 @@ struct WeighContacts {
 };
 
 // The pairs of each segment: [first[segment], first[segment + 1]) of `entry`, which holds a pair's number
-// and, in its lowest bit, whether the segment is its b.
+// and, in its lowest bit, whether the segment is its b. Some more are set, to look ahead.
 struct ContactLists {
+  static constexpr std::int32_t kPadding = 16;
   const std::int32_t* first;
   const std::int32_t* entry;
 };

@@ -86,9 +86,9 @@ class ContactSolver : public HairContacts<Scalar<R>> {
 
   std::size_t bytes() const override {
     return backend_.bytes() + first_.bytes() + strand_.bytes() + start_.bytes() + end_.bytes() +
-           velocity_.bytes() + contacts_.bytes() + list_first_.bytes() + list_entry_.bytes() +
-           cursor_.bytes() + record_.bytes() + active_.bytes() + list_.bytes() + load_.bytes() +
-           kappa_.bytes() + neighbours_.bytes() + standing_.bytes();
+           velocity_.bytes() + list_first_.bytes() + list_entry_.bytes() + cursor_.bytes() + record_.bytes() +
+           active_.bytes() + list_.bytes() + load_.bytes() + kappa_.bytes() + neighbours_.bytes() +
+           standing_.bytes();
   }
 
  private:
@@ -185,11 +185,11 @@ class ContactSolver : public HairContacts<Scalar<R>> {
   // Which pairs each segment has.
   void index_pairs() {
     const std::int32_t pairs = pairs_.count;
-    load_.resize(particles_), kappa_.resize(first_.size() - 1), contacts_.resize(particles_);
+    load_.resize(particles_), kappa_.resize(first_.size() - 1);
     record_.resize(pairs + kWidth), active_.resize(pairs + kWidth);
     list_first_.resize(particles_ + 1), cursor_.resize(particles_),
-        list_entry_.resize(2 * static_cast<std::size_t>(pairs));
-    pairs_ = {list_.a(), list_.b(), list_.side(), record_.data(), active_.data(), contacts_.data(), pairs};
+        list_entry_.resize(2 * static_cast<std::size_t>(pairs) + ContactLists::kPadding);
+    pairs_ = {list_.a(), list_.b(), list_.side(), record_.data(), active_.data(), pairs};
     std::int32_t *first = list_first_.data(), *cursor = cursor_.data(), *entry = list_entry_.data();
     const std::int32_t *a = pairs_.a, *b = pairs_.b;
     backend_.parallel_for("clear lists", particles_ + 1,
@@ -200,6 +200,8 @@ class ContactSolver : public HairContacts<Scalar<R>> {
     backend_.scan("start lists", list_first_, particles_ + 1);
     backend_.parallel_for("copy lists", particles_,
                           [=] RINGLET_LAMBDA(std::int32_t p) { cursor[p] = first[p]; });
+    backend_.parallel_for("pad lists", ContactLists::kPadding,
+                          [=] RINGLET_LAMBDA(std::int32_t k) { entry[2 * pairs + k] = 0; });
     // In no particular order: what is summed over a list is the same in any.
     backend_.parallel_for("fill lists", pairs, [=] RINGLET_LAMBDA(std::int32_t k) {
       entry[atomic_add(&cursor[a[k]], 1)] = 2 * k, entry[atomic_add(&cursor[b[k]], 1)] = 2 * k + 1;
@@ -208,14 +210,11 @@ class ContactSolver : public HairContacts<Scalar<R>> {
 
   // Returns how many contacts there are.
   std::int64_t find() {
-    std::int32_t* contacts = contacts_.data();
-    backend_.parallel_for("clear contacts", particles_,
-                          [=] RINGLET_LAMBDA(std::int32_t p) { contacts[p] = 0; });
     backend_.parallel_for("find contacts", packs(), FindContacts<R>{pairs_, places()}, kPackChunk);
-    return static_cast<std::int64_t>(backend_.sum(
-               "count contacts", particles_,
-               [=] RINGLET_LAMBDA(std::int32_t p) { return static_cast<double>(contacts[p]); })) /
-           2;
+    const unsigned char* active = active_.data();
+    return static_cast<std::int64_t>(
+        backend_.sum("count contacts", pairs_.count,
+                     [=] RINGLET_LAMBDA(std::int32_t k) { return active[k] != 0 ? 1.0 : 0.0; }));
   }
 
   void answer(const HairContactStep<T>& step) {
@@ -260,7 +259,7 @@ class ContactSolver : public HairContacts<Scalar<R>> {
   ContactPairs<T> pairs_{};
   std::int32_t particles_ = 0;
   Buffer<Place<T>> start_, end_, velocity_;
-  Buffer<std::int32_t> first_, strand_, contacts_, list_first_, list_entry_, cursor_;
+  Buffer<std::int32_t> first_, strand_, list_first_, list_entry_, cursor_;
   Buffer<ContactRecord<T>> record_;
   Buffer<unsigned char> active_;
   Buffer<ParticleLoad> load_;

@@ -6,8 +6,8 @@
 // that have met little go on, among themselves, farther along their way against the hair's mean motion; in
 // the last to the end.
 #pragma once
-#include "kernels/contact/box_sorter.h"
 #include "kernels/contact/pair_search.h"
+#include "kernels/contact/segment_sorter.h"
 
 namespace ringlet::kernels {
 inline namespace RINGLET_ISA {
@@ -32,8 +32,7 @@ class Neighbours {
           return static_cast<double>(places.end[p].extra);
         }));
     const float spacing = find_spacing(backend, places, extent);
-    const SweptBoxes swept{extent,          motion_.carried(),      true,
-                           motion_.slope(), kFewSpacings * spacing, kPieceSpacings * spacing};
+    const SweptSegments swept{extent, motion_.carried(), true, motion_.slope(), kFewSpacings * spacing};
     meetings_.resize(places.particles), last_round_.resize(places.particles);
     search(backend, places, swept);
     return gather_pairs(backend);
@@ -53,7 +52,7 @@ class Neighbours {
   // Another round is not begun where it would be more work than this: hits are some 8 times those of the one
   // before, which went a quarter as far.
   static constexpr double kMostHits = 1 << 24, kHitsGrow = 8;
-  static constexpr float kFewSpacings = 0.08f, kPieceSpacings = 4.5f, kFartherEachRound = 4;
+  static constexpr float kFewSpacings = 0.08f, kFartherEachRound = 4;
   static constexpr std::int32_t kFewNeighbours = 4;
   static constexpr int kSearchChunk = 4;  // groups
 
@@ -86,7 +85,7 @@ class Neighbours {
     return cell * static_cast<float>(sqrt(static_cast<double>(cell) / max(length_there, 1e-12)));
   }
 
-  void search(Backend& backend, const HairPlaces<T>& places, SweptBoxes swept) {
+  void search(Backend& backend, const HairPlaces<T>& places, SweptSegments swept) {
     signed char* last_round = last_round_.data();
     const std::int32_t* meetings = meetings_.data();
     const Place<float>* carried = swept.carried;
@@ -117,20 +116,19 @@ class Neighbours {
     return !(dot(way, way) <= farthest * farthest);
   }
 
-  // Returns how many pairs of boxes met, -1 where nobody looks.
-  double search_round(Backend& backend, int round, const HairPlaces<T>& places, const SweptBoxes& swept) {
+  // Returns how many pairs of tubes met, -1 where nobody looks.
+  double search_round(Backend& backend, int round, const HairPlaces<T>& places, const SweptSegments& swept) {
     const signed char* last_round = last_round_.data();
-    const BoxTable table = sorter_.sort(
+    const SegmentTable<T> table = sorter_.sort(
         backend, places, swept, [=] RINGLET_LAMBDA(std::int32_t p) { return last_round[p] == round; });
-    if (table.boxes == 0) return -1;
-    const std::int32_t groups = (table.boxes + kGroupPieces - 1) / kGroupPieces;
+    if (table.segments == 0) return -1;
+    const std::int32_t groups = (table.segments + kGroupSegments - 1) / kGroupSegments;
     hits_.resize(groups);
     std::int32_t *meetings = meetings_.data(), *hits = hits_.data();
     rounds_[round].fill(backend, groups, [&](const PairPool& pool) {
       backend.parallel_for("clear meetings", places.particles,
                            [=] RINGLET_LAMBDA(std::int32_t p) { meetings[p] = 0; });
-      const T far = T(2 * swept.along_both()) + 2 * T(kNear) * thickest_;
-      const PairSearch<F, R> search{table, places, far, meetings, hits, pool};
+      const PairSearch<F, R> search{table, meetings, hits, pool};
       backend.parallel_for("contact pairs", groups, search, kSearchChunk);
     });
     return backend.sum("hits", groups,
@@ -214,13 +212,13 @@ class Neighbours {
     }));
   }
 
-  // Where there are more pairs than these and than two a segment, each piece looks at fewer of its own, those
-  // that matter most; never at fewer than kLeastPairs.
+  // Where there are more pairs than these and than two a segment, each segment looks at fewer of its own,
+  // those that matter most; never at fewer than kLeastPairs.
   static constexpr std::int64_t kMostLookedAt = 1 << 18;
   static constexpr std::int32_t kLeastPairs = 1;
 
   MotionField<Backend, T> motion_;
-  BoxSorter<Backend, T> sorter_;
+  SegmentSorter<Backend, F, T> sorter_;
   PairMemory<Backend> rounds_[kRounds];
   int rounds_taken_ = 0;
   double most_looked_at_ = 0;

@@ -1,4 +1,4 @@
-// Pairs in memory while they are found: nobody knows how many there will be. Each group of pieces fills
+// Pairs in memory while they are found: nobody knows how many there will be. Each group of segments fills
 // blocks of its own, taken from the pool one by one.
 #pragma once
 #include "kernels/backend/atomic.h"
@@ -6,13 +6,13 @@
 namespace ringlet::kernels {
 inline namespace RINGLET_ISA {
 
-inline constexpr int kPairBlock = 256, kGroupPieces = 64;
+inline constexpr int kPairBlock = 256, kGroupSegments = 64;
 
-// Of one piece of a segment, with those that come after it in the table. In dense hair that moves far in a
-// frame a piece would meet dozens of others, all but the first of which it never gets to where those hold it.
+// Of one segment, with those that come after it in the table. In dense hair that moves far in a frame a
+// segment would meet dozens of others, all but the first of which it never gets to where those hold it.
 inline constexpr int kMostPairs = 32;
 
-// `rank`: among the pairs of a's piece, by how much they matter; of those that have not crossed, kNearRank
+// `rank`: among the pairs of a, by how much they matter; of those that have not crossed, kNearRank
 // more.
 inline constexpr int kNearRank = 8, kRanks = kMostPairs + kNearRank;
 struct RankedPair {

@@ -17,6 +17,7 @@
 // exceeds its rows' sums exceeds the matrix; without A this is mass splitting: Tonge, Benevolenski,
 // Voroshilov 2012.)
 #pragma once
+#include "kernels/backend/words.h"
 #include "kernels/contact/contact_passes.h"
 
 namespace ringlet::kernels {
@@ -49,35 +50,37 @@ struct ContactStrands {
   // Calls visit(pair's record, whether the segment is its b).
   template <class Visit>
   RINGLET_KERNEL void for_contacts(std::int32_t segment, const Visit& visit) const {
-    if (pairs.contacts[segment] == 0) return;
+    // Records lie about in memory, as the segments' partners do.
     for (std::int32_t k = lists.first[segment]; k < lists.first[segment + 1]; ++k) {
       const std::int32_t entry = lists.entry[k], pair = entry >> 1;
+      prefetch(&pairs.record[lists.entry[k + lists.kPadding] >> 1]);
       if (pairs.active[pair]) visit(pairs.record[pair], (entry & 1) != 0);
     }
   }
 
-  // d = A^-1 f in place, components [begin, finish) of the loads: Thomas algorithm.
-  RINGLET_FUNCTION void respond(std::int32_t strand, double kappa_here, int begin, int finish) const {
+  // d = A^-1 f in place, components [kBegin, kEnd) of the loads: Thomas algorithm.
+  template <int kBegin, int kEnd>
+  RINGLET_FUNCTION void respond(std::int32_t strand, double kappa_here) const {
     const std::int32_t n = particles(strand);
     ParticleLoad* at = load + first(strand);
     double carry = 0;
     for (std::int32_t i = 0; i < n; ++i) {
       ParticleLoad& here = at[i];
       if (i < clamped) {
-        for (int k = begin; k < finish; ++k) here.value[k] = 0;
+        for (int k = kBegin; k < kEnd; ++k) here.value[k] = 0;
         here.carry = 0;
         continue;
       }
       const double links = (i > 0 ? 1 : 0) + (i + 1 < n ? 1 : 0);
       const double inverse = 1 / (1 + kappa_here * (links - carry));
-      for (int k = begin; k < finish; ++k) {
+      for (int k = kBegin; k < kEnd; ++k) {
         const double before = i > 0 ? at[i - 1].value[k] : 0;
         here.value[k] = (here.value[k] + kappa_here * before) * inverse;
       }
       carry = here.carry = kappa_here * inverse;
     }
     for (std::int32_t i = n - 2; i >= clamped; --i)
-      for (int k = begin; k < finish; ++k) at[i].value[k] += at[i].carry * at[i + 1].value[k];
+      for (int k = kBegin; k < kEnd; ++k) at[i].value[k] += at[i].carry * at[i + 1].value[k];
   }
 };
 
@@ -110,7 +113,7 @@ struct FindResponse {
     const double reach = kReach * depth * (n - 1) / max(length, 1e-9);
     const double kappa = reach * reach;
     strands.kappa[strand] = kappa;
-    strands.respond(strand, kappa, 0, 1);
+    strands.template respond<0, 1>(strand, kappa);
     for (std::int32_t i = 0, p = first; i < n; ++i, ++p)
       strands.velocity[p].extra = static_cast<T>(strands.load[p].value[0]);
   }
@@ -135,7 +138,7 @@ struct ApplyContacts {
         }
       });
     }
-    strands.respond(strand, strands.kappa[strand], 1, kLoads);
+    strands.template respond<1, kLoads>(strand, strands.kappa[strand]);
     for (std::int32_t i = strands.clamped, p = first + i; i < n; ++i, ++p) {
       move(strands.end[p], strands.load[p].value + 1), move(strands.velocity[p], strands.load[p].value + 4);
     }

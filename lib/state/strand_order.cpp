@@ -1,16 +1,48 @@
 #include "state/strand_order.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <numeric>
 
 namespace ringlet::state {
+namespace {
+
+// Where each strand's root lies on a curve that fills their bounding box, the Z-order of its cells (Morton
+// 1966): what is near one another on it is so in space.
+template <class T>
+std::vector<std::uint64_t> places_on_curve(const StrandLayout& layout, const StrandState<T>& state) {
+  constexpr int kBits = 20;  // of an axis
+  const auto strands = static_cast<std::int32_t>(layout.strands());
+  const auto root = [&](std::int32_t strand, int c) {
+    return state.root_points[layout.at_strand(strand, 3, c)];
+  };
+  std::vector<std::uint64_t> places(strands);
+  double low[3], longest = 0;
+  for (int c = 0; c < 3; ++c) {
+    double high = low[c] = strands == 0 ? 0 : root(0, c);
+    for (std::int32_t strand = 0; strand < strands; ++strand)
+      low[c] = std::min(low[c], root(strand, c)), high = std::max(high, root(strand, c));
+    longest = std::max(longest, high - low[c]);
+  }
+  const double per_length = longest > 0 ? ((1 << kBits) - 1) / longest : 0;
+  for (std::int32_t strand = 0; strand < strands; ++strand)
+    for (int c = 0; c < 3; ++c) {
+      const auto cell = static_cast<std::uint64_t>((root(strand, c) - low[c]) * per_length);
+      for (int bit = 0; bit < kBits; ++bit) places[strand] |= (cell >> bit & 1) << (3 * bit + c);
+    }
+  return places;
+}
+
+}  // namespace
 
 template <class T>
 std::vector<std::int32_t> strands_by_root(const StrandModel<T>& model, const StrandState<T>& state) {
   const StrandLayout& layout = model.layout;
   std::vector<std::int32_t> strands(layout.strands());
   std::iota(strands.begin(), strands.end(), 0);
+  const std::vector<std::uint64_t> place = places_on_curve(layout, state);
   const auto comes_first = [&](std::int32_t one, std::int32_t other) {
+    if (place[one] != place[other]) return place[one] < place[other];
     for (int c = 0; c < 3; ++c) {
       const double a = state.root_points[layout.at_strand(one, 3, c)],
                    b = state.root_points[layout.at_strand(other, 3, c)];

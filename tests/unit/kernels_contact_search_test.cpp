@@ -1,0 +1,132 @@
+// The search for pairs of segments against all pairs, and the tubes that it compares.
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "contact_support.h"
+#include "kernels/contact/contact_data.h"
+#include "kernels/contact/tube.h"
+
+namespace ringlet::kernels_testing {
+namespace {
+
+class Random {
+ public:
+  explicit Random(unsigned seed) : engine_(seed) {}
+  double symmetric() { return uniform_(engine_); }
+  double between(double low, double high) { return low + 0.5 * (high - low) * (1 + symmetric()); }
+  Vec3 vector(double size) { return size * Vec3(symmetric(), symmetric(), symmetric()); }
+
+ private:
+  std::mt19937 engine_;
+  std::uniform_real_distribution<double> uniform_{-1, 1};
+};
+
+template <class T>
+kernels::Vector3<T> vector_of(const Vec3& v) {
+  return {static_cast<T>(v.x()), static_cast<T>(v.y()), static_cast<T>(v.z())};
+}
+
+// A segment that moves, and what is about it.
+struct Moved {
+  Vec3 begin[2], end[2];
+  double margin;
+
+  template <class T>
+  kernels::Tube<T> tube(bool still, int axis) const {
+    using V = kernels::Vector3<T>;
+    const V first = vector_of<T>(begin[0]), last = vector_of<T>(end[0]);
+    if (still) return kernels::Tube<T>::template about<1>({first}, {last}, static_cast<T>(margin), axis);
+    return kernels::Tube<T>::template about<2>({first, vector_of<T>(begin[1])}, {last, vector_of<T>(end[1])},
+                                               static_cast<T>(margin), axis);
+  }
+  Vec3 place(double along, double time) const {
+    const Vec3 first = begin[0] + time * (begin[1] - begin[0]), last = end[0] + time * (end[1] - end[0]);
+    return first + along * (last - first);
+  }
+};
+
+template <class T>
+class ContactSearch : public testing::Test {};
+using Precisions = testing::Types<float, double>;
+TYPED_TEST_SUITE(ContactSearch, Precisions);
+
+// Two that come as near as their margins at some places and times have tubes that meet, whatever the axis.
+TYPED_TEST(ContactSearch, TubesOfWhatIsNearMeet) {
+  Random random(3);
+  int apart = 0, boxes = 0;
+  constexpr int kTrials = 20000;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    const bool still = trial % 2 == 0;
+    Moved one, other;
+    const Vec3 along = random.vector(0.01);  // of both, more or less, or of neither
+    const double spread = trial % 3 == 0 ? 0.01 : 0.001;
+    for (Moved* segment : {&one, &other}) {
+      segment->begin[0] = random.vector(0.003),
+      segment->end[0] = segment->begin[0] + along + random.vector(spread);
+      segment->begin[1] = segment->begin[0] + random.vector(0.002);
+      segment->end[1] = segment->end[0] + random.vector(0.002);
+      segment->margin = random.between(0, 1e-3);
+    }
+    double nearest = 1;
+    constexpr int kPlaces = 12, kTimes = 5;
+    for (int a = 0; a <= kPlaces; ++a)
+      for (int b = 0; b <= kPlaces; ++b)
+        for (int t = 0; t <= kTimes; ++t)
+          for (int u = 0; u <= kTimes; ++u) {
+            const double times[2] = {still ? 0.0 : t / double{kTimes}, still ? 0.0 : u / double{kTimes}};
+            nearest = std::min(nearest, (one.place(a / double{kPlaces}, times[0]) -
+                                         other.place(b / double{kPlaces}, times[1]))
+                                            .norm());
+            if (still) t = u = kTimes;
+          }
+    for (int axis = 0; axis < 3; ++axis) {
+      const bool meet = one.tube<TypeParam>(still, axis).meets(other.tube<TypeParam>(still, axis));
+      EXPECT_TRUE(meet || nearest > one.margin + other.margin - 1e-8) << trial << ' ' << axis;
+      if (nearest > one.margin + other.margin + 0.002) apart += !meet, ++boxes;
+    }
+  }
+  EXPECT_GT(apart, 0.5 * boxes) << "tubes are of use";
+}
+
+// Segments of one to a hundred millimetres that move together and a little each for itself.
+TYPED_TEST(ContactSearch, FindsThePairsThatThereAre) {
+  using T = TypeParam;
+  constexpr int kStrands = 900;
+  constexpr double kRadius = 1e-4;
+  Random random(11);
+  std::vector<HairStrand> strands;
+  for (int s = 0; s < kStrands; ++s) {
+    const double length = std::pow(10, random.between(-3, -1));
+    const Vec3 middle = s == 0 ? Vec3(40, -30, 20) : random.vector(0.05);  // one was flung away
+    strands.push_back(straight_strand(middle, length * random.vector(1).normalized(), 2, Vec3::Zero()));
+  }
+  HairRun<T> run(strands, kRadius, 0);
+  run.remember();
+  const auto read = [&](std::size_t s) {
+    return kernels::Segment<T>{vector_of<T>(run.position(s, 0)), vector_of<T>(run.position(s, 1))};
+  };
+  std::vector<kernels::Segment<T>> start, end;
+  for (std::size_t s = 0; s < kStrands; ++s) start.push_back(read(s));
+  for (std::size_t s = 0; s < kStrands; ++s)
+    for (int i = 0; i < 2; ++i) {
+      const Vec3 at = run.position(s, i);
+      const Vec3 together(0.03 + 0.05 * at.y(), -0.01, 0.02 * at.x());
+      run.set_position(s, i, at + together + random.vector(0.002));
+    }
+  for (std::size_t s = 0; s < kStrands; ++s) end.push_back(read(s));
+
+  int pairs = 0, crossed = 0;
+  for (std::size_t a = 0; a < kStrands; ++a)
+    for (std::size_t b = a + 1; b < kStrands; ++b) {
+      const auto contact = kernels::find_contact(kernels::SegmentPair<T>{start[a], start[b], end[a], end[b]},
+                                                 T(2 * kRadius), T(0));
+      crossed += contact.crossed;
+      pairs += contact.crossed || contact.distance < T(kernels::kNear * 2 * kRadius);
+    }
+  EXPECT_GT(crossed, 50);
+  EXPECT_EQ(run.contacts->begin(run.contact_step()).pairs, pairs);
+}
+
+}  // namespace
+}  // namespace ringlet::kernels_testing

@@ -60,8 +60,12 @@ RINGLET_KERNEL int append_selected(T* to, const T* from, std::uint32_t bits) {
   return count;
 }
 
+// The same for a pack, or for one value.
+RINGLET_KERNEL int append_selected(float* to, float from, std::uint32_t bits) {
+  *to = from;
+  return static_cast<int>(bits & 1);
+}
 #if !defined(__CUDACC__)
-// The same for a pack.
 template <class T, int W>
 RINGLET_KERNEL int append_selected(T* to, Pack<T, W> from, std::uint32_t bits) {
   alignas(64) T values[W];

@@ -13,7 +13,7 @@
 namespace ringlet::kernels {
 inline namespace RINGLET_ISA {
 
-// F: the pack that boxes are compared by; R: the one that pairs are computed by, or scalars on a GPU.
+// F: the pack that tubes are compared by; R: the one that pairs are computed by.
 template <class Backend, class F, class R>
 class ContactSolver : public HairContacts<Scalar<R>> {
  public:

@@ -116,15 +116,16 @@ class MotionField {
     const MotionLattice lattice = lattice_;
     const MotionNode* nodes = nodes_.data();
     backend.parallel_for("carry starts", places.particles, [=] RINGLET_LAMBDA(std::int32_t p) {
-      const Vector3<float> start = float_vector(places.start[p]), mean = mean_motion(lattice, nodes, start),
-                           moved = start + mean;
-      float stray = 0;
-      if (places.strand[p] >= 0) {
-        const Vector3<float> next = float_vector(places.start[p + 1]);
-        const Vector3<float> ends = mean + mean_motion(lattice, nodes, next);
-        stray = length(mean_motion(lattice, nodes, 0.5f * (start + next)) - 0.5f * ends);
-      }
-      carried[p] = {moved.x, moved.y, moved.z, stray};
+      const Vector3<float> start = float_vector(places.start[p]),
+                           moved = start + mean_motion(lattice, nodes, start);
+      carried[p] = {moved.x, moved.y, moved.z, 0};
+    });
+    backend.parallel_for("how they stray", places.particles, [=] RINGLET_LAMBDA(std::int32_t p) {
+      if (places.strand[p] < 0) return;
+      const Vector3<float> middle =
+          0.5f * (float_vector(places.start[p]) + float_vector(places.start[p + 1]));
+      const Vector3<float> of_ends = 0.5f * (vector_of(carried[p]) + vector_of(carried[p + 1]));
+      carried[p].extra = length(middle + mean_motion(lattice, nodes, middle) - of_ends);
     });
   }
 

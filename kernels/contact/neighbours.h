@@ -27,10 +27,6 @@ class Neighbours {
     if (extent.segments == 0) return 0;
     most_looked_at_ = max(static_cast<double>(kMostLookedAt), 2.0 * extent.segments);
     motion_.find(backend, places, extent);
-    thickest_ =
-        static_cast<T>(backend.largest("radius", places.particles, 0, [=] RINGLET_LAMBDA(std::int32_t p) {
-          return static_cast<double>(places.end[p].extra);
-        }));
     const float spacing = find_spacing(backend, places, extent);
     const SweptSegments swept{extent, motion_.carried(), true, motion_.slope(), kFewSpacings * spacing};
     meetings_.resize(places.particles), last_round_.resize(places.particles);
@@ -222,7 +218,6 @@ class Neighbours {
   PairMemory<Backend> rounds_[kRounds];
   int rounds_taken_ = 0;
   double most_looked_at_ = 0;
-  T thickest_ = T(0);  // radius [m]
   Buffer<std::int32_t> crowd_, meetings_, hits_, kept_, ranks_, a_, b_;
   Buffer<signed char> last_round_;  // [particles] that each segment looks in
 };

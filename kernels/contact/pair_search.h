@@ -30,12 +30,10 @@ struct PairSearch {
     Work work(writer);
     for (std::int32_t i = begin; i < end;) {
       std::int32_t next = i + 1;
-      while (next < end && table.key[next] == table.key[i]) ++next;
+      while (next < end && table.key[next] == table.key[i] && are_close(i, next)) ++next;
       search_cell(i, next, work);
       i = next;
     }
-    look_at(work);
-    write(work);
     hits[group] = work.hits.total;
     pool.last[group] = writer.block, pool.count[group] = writer.count;
   }
@@ -56,7 +54,7 @@ struct PairSearch {
 
   // The pairs of one segment that matter most: what it met earliest on its way, then what it is nearest to.
   struct Chosen {
-    std::int32_t a = -1, met = 0, count = 0, b[kMostPairs];
+    std::int32_t met, count, b[kMostPairs];  // met: as in `meetings`
     T key[kMostPairs];
 
     RINGLET_KERNEL void offer(std::int32_t other, T its_key) {
@@ -72,16 +70,28 @@ struct PairSearch {
     SegmentList<F> own, others;
     Hits hits;
     Suspects suspects;
-    Chosen chosen;
+    std::int32_t first = 0;         // own segment of the table
+    Chosen chosen[kGroupSegments];  // of each own segment
 
     explicit Work(PairWriter& to) : writer(to) {}
   };
+
+  // Cells are numbered modulo a power of two: what shares one may be far apart.
+  RINGLET_KERNEL bool are_close(std::int32_t i, std::int32_t other) const {
+    const BoxLevel& level = table.levels.level[table.levels.level_with(table.cell_of(table.key[i]))];
+    const Box one = table.box(i), another = table.box(other);
+    bool close = true;
+    for (int c = 0; c < 3; ++c) close = close && abs(one.low[c] - another.low[c]) < 4 * level.half_size;
+    return close;
+  }
 
   // Segments [begin, end) of one cell, which run along the same axis.
   RINGLET_FUNCTION void search_cell(std::int32_t begin, std::int32_t end, Work& work) const {
     const int axis = table.axis_of(table.key[begin]);
     SegmentList<F>&own = work.own, &others = work.others;
     own.count = others.count = 0;
+    work.first = begin;
+    for (std::int32_t k = 0; k < end - begin; ++k) work.chosen[k].met = work.chosen[k].count = 0;
     for_packs(begin, end, [&](std::int32_t j, std::uint32_t bits) { own.append(tubes(j, axis), j, bits); });
     own.close();
     for (int k = 0; k + 1 < own.count; ++k) meet(k, own, k + 1, work);
@@ -100,6 +110,8 @@ struct PairSearch {
         });
       });
     meet_others(work);
+    look_at(work);
+    for (std::int32_t k = 0; k < end - begin; ++k) write(table.segment[begin + k], work.chosen[k], work);
   }
 
   RINGLET_KERNEL Tube<F> tubes(std::int32_t first, int axis) const {
@@ -196,26 +208,22 @@ struct PairSearch {
       store(key, select(contact.crossed, R(-1) - contact.later, contact.distance));
       for (; found; found &= found - 1) {
         const int lane = __builtin_ctz(found);
-        choose(table.segment[a[lane] / 4], table.segment[b[lane] / 4], key[lane], work);
+        choose(work.chosen[a[lane] / 4 - work.first], table.segment[b[lane] / 4], key[lane]);
       }
     }
   }
 
-  RINGLET_KERNEL void choose(std::int32_t a, std::int32_t b, T key, Work& work) const {
-    Chosen& chosen = work.chosen;
-    if (chosen.a != a) write(work), chosen.a = a;
+  RINGLET_KERNEL void choose(Chosen& chosen, std::int32_t b, T key) const {
     chosen.offer(b, key);
     const std::int32_t met = key < T(0) ? 1 + kCrossing : 1;
     chosen.met += met, atomic_add(&meetings[b], met);
   }
 
   // Writes what was chosen for a segment.
-  RINGLET_FUNCTION void write(Work& work) const {
-    Chosen& chosen = work.chosen;
-    if (chosen.met != 0) atomic_add(&meetings[chosen.a], chosen.met), chosen.met = 0;
+  RINGLET_FUNCTION void write(std::int32_t a, const Chosen& chosen, Work& work) const {
+    if (chosen.met != 0) atomic_add(&meetings[a], chosen.met);
     for (std::int32_t k = 0; k < chosen.count; ++k)
-      work.writer.add({chosen.a, chosen.b[k], chosen.key[k] < T(0) ? k : k + kNearRank});
-    chosen.count = 0;
+      work.writer.add({a, chosen.b[k], chosen.key[k] < T(0) ? k : k + kNearRank});
   }
 };
 

@@ -21,12 +21,12 @@ RINGLET_KERNEL void for_numbers(const Tube<R>& tube, const auto& visit) {
 
 template <class F>
 struct SegmentList {
-  static constexpr int kWidth = Traits<F>::kWidth, kRoom = 512, kStride = kRoom + 16;
+  static constexpr int kWidth = Traits<F>::kWidth, kRoom = 512, kWidest = 16, kStride = kRoom + kWidest;
   alignas(64) float numbers[Tube<F>::kNumbers][kStride];
   std::int32_t at[kStride];  // in the table
   int count = 0;
 
-  RINGLET_KERNEL bool full() const { return count > kRoom - kWidth; }
+  RINGLET_KERNEL bool full() const { return count > kRoom - kWidest; }
   // Those of a pack of the table, first, first + 1, ..., whose bit is set.
   RINGLET_KERNEL void append(const Tube<F>& tubes, std::int32_t first, std::uint32_t bits) {
     for_numbers(tubes, [&](int k, F number) { append_selected(numbers[k] + count, number, bits); });

@@ -61,7 +61,8 @@ class SegmentSorter {
       if (p == particles || places.strand[p] < 0 || !counts(p)) return;
       const Vector3<float> end = float_vector(places.end[p]), along = float_vector(places.end[p + 1]) - end,
                            from = vector_of(carried[p]), then = vector_of(carried[p + 1]) - from;
-      const bool lost = !(dot(end, end) + dot(along, along) + dot(from, from) + dot(then, then) < 1e12f);
+      const bool lost = !(dot(end, end) + dot(along, along) + dot(from, from) + dot(then, then) < 1e12f) ||
+                        !(thickest(places.end, p) < T(1e6));
       if (!lost) start[p] = 1;
     });
     const std::int32_t all = backend.scan("start segments", start_, particles + 1);
@@ -135,8 +136,14 @@ class SegmentSorter {
       const float half = place[k].half_size;
       return half > 0 ? 1 / static_cast<double>(half) : 0.0;
     });
-    const double mean = per_size > 0 ? segments / per_size : 1;
-    return BoxLevels::make(extent.low, extent.high, static_cast<float>(mean), segments);
+    // The largest of those that are about as large as most.
+    const double most = per_size > 0 ? 1.5 * segments / per_size : 1;
+    const double first =
+        backend.largest("contact sizes", segments, 0.5 * most, [=] RINGLET_LAMBDA(std::int32_t k) {
+          const auto half = static_cast<double>(place[k].half_size);
+          return half <= most ? half : 0.0;
+        });
+    return BoxLevels::make(extent.low, extent.high, static_cast<float>(first), segments);
   }
 
   void sort_cells(Backend& backend, const BoxLevels& levels, std::int32_t segments) {

@@ -14,9 +14,6 @@ inline namespace RINGLET_ISA {
 struct Box {
   float low[3], high[3];
 
-  RINGLET_KERNEL float half_size() const {
-    return 0.5f * max(max(high[0] - low[0], high[1] - low[1]), high[2] - low[2]);
-  }
   RINGLET_KERNEL void extend(const Box& box) {
     for (int c = 0; c < 3; ++c) low[c] = min(low[c], box.low[c]), high[c] = max(high[c], box.high[c]);
   }
@@ -37,14 +34,14 @@ struct BoxLevels {
   BoxLevel level[kLevels];
   std::int32_t total_cells;
 
-  // Levels from the boxes' mean half size on; few boxes have few cells.
-  RINGLET_FUNCTION static BoxLevels make(const float* low, const float* high, float mean_half_size,
+  // Levels from a half size on; few boxes have few cells.
+  RINGLET_FUNCTION static BoxLevels make(const float* low, const float* high, float first_half_size,
                                          std::int32_t boxes) {
     BoxLevels levels{};
     for (int c = 0; c < 3; ++c) levels.low[c] = low[c];
     for (int k = 0; k < kLevels; ++k) {
       BoxLevel& level = levels.level[k];
-      level.half_size = k == 0 ? 1.5f * mean_half_size : 2 * levels.level[k - 1].half_size;
+      level.half_size = k == 0 ? first_half_size : 2 * levels.level[k - 1].half_size;
       level.per_cell = kCellsPerHalf / level.half_size;
       level.first_cell = levels.total_cells;
       levels.total_cells += share_cells(level, low, high, boxes);
@@ -104,7 +101,7 @@ struct BoxLevels {
 
 // What is known of a segment in one place.
 template <class T>
-struct alignas(16 * sizeof(T)) SegmentPlaces {
+struct alignas(64) SegmentPlaces {
   // At the start and at the end. extra: at start.begin the strand's number, see number_of; at the end radii
   // [m].
   struct Ends {
@@ -169,8 +166,9 @@ RINGLET_KERNEL void for_runs(const SegmentTable<T>& table, int level, const Box&
   const float reach = level + 1 < kLevels ? 1.001f * at.half_size : 3e38f;
   std::int32_t begin[3], count[3];
   for (int c = 0; c < 3; ++c) {
-    begin[c] = table.levels.cell_along(at, c, box.low[c] - reach);
-    const std::int32_t cells = table.levels.cell_along(at, c, box.high[c] + reach) - begin[c] + 1;
+    const float here = reach + 1e-6f * max(abs(box.low[c]), abs(box.high[c]));
+    begin[c] = table.levels.cell_along(at, c, box.low[c] - here);
+    const std::int32_t cells = table.levels.cell_along(at, c, box.high[c] + here) - begin[c] + 1;
     count[c] = cells < at.cells[c] ? cells : at.cells[c];
   }
   const std::int32_t from = begin[0] & (at.cells[0] - 1);

@@ -24,10 +24,11 @@ std::vector<std::uint64_t> places_on_curve(const StrandLayout& layout, const Str
       low[c] = std::min(low[c], root(strand, c)), high = std::max(high, root(strand, c));
     longest = std::max(longest, high - low[c]);
   }
-  const double per_length = longest > 0 ? ((1 << kBits) - 1) / longest : 0;
+  const double most = (1 << kBits) - 1, per_length = longest > 0 ? most / longest : 0;
   for (std::int32_t strand = 0; strand < strands; ++strand)
     for (int c = 0; c < 3; ++c) {
-      const auto cell = static_cast<std::uint64_t>((root(strand, c) - low[c]) * per_length);
+      const double at = (root(strand, c) - low[c]) * per_length;  // 0 also for what is not a number
+      const std::uint64_t cell = at > 0 ? static_cast<std::uint64_t>(std::min(at, most)) : 0;
       for (int bit = 0; bit < kBits; ++bit) places[strand] |= (cell >> bit & 1) << (3 * bit + c);
     }
   return places;

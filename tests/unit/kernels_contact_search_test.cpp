@@ -1,11 +1,14 @@
 // The search for pairs of segments against all pairs, and the tubes that it compares.
 #include <gtest/gtest.h>
 
+#include <map>
 #include <random>
+#include <set>
 
 #include "contact_support.h"
-#include "kernels/contact/contact_data.h"
-#include "kernels/contact/tube.h"
+#include "kernels/backend/host.h"
+#include "kernels/contact/pair_search.h"
+#include "kernels/contact/segment_sorter.h"
 
 namespace ringlet::kernels_testing {
 namespace {
@@ -54,7 +57,7 @@ TYPED_TEST_SUITE(ContactSearch, Precisions);
 // Two that come as near as their margins at some places and times have tubes that meet, whatever the axis.
 TYPED_TEST(ContactSearch, TubesOfWhatIsNearMeet) {
   Random random(3);
-  int apart = 0, boxes = 0;
+  int told_apart = 0, apart = 0;
   constexpr int kTrials = 20000;
   for (int trial = 0; trial < kTrials; ++trial) {
     const bool still = trial % 2 == 0;
@@ -67,6 +70,7 @@ TYPED_TEST(ContactSearch, TubesOfWhatIsNearMeet) {
       segment->begin[1] = segment->begin[0] + random.vector(0.002);
       segment->end[1] = segment->end[0] + random.vector(0.002);
       segment->margin = random.between(0, 1e-3);
+      if (trial % 50 == 1) segment->end[0] = segment->begin[0];  // of no length
     }
     double nearest = 1;
     constexpr int kPlaces = 12, kTimes = 5;
@@ -83,10 +87,10 @@ TYPED_TEST(ContactSearch, TubesOfWhatIsNearMeet) {
     for (int axis = 0; axis < 3; ++axis) {
       const bool meet = one.tube<TypeParam>(still, axis).meets(other.tube<TypeParam>(still, axis));
       EXPECT_TRUE(meet || nearest > one.margin + other.margin - 1e-8) << trial << ' ' << axis;
-      if (nearest > one.margin + other.margin + 0.002) apart += !meet, ++boxes;
+      if (nearest > one.margin + other.margin + 0.002) told_apart += !meet, ++apart;
     }
   }
-  EXPECT_GT(apart, 0.5 * boxes) << "tubes are of use";
+  EXPECT_GT(told_apart, 0.5 * apart) << "tubes are of use";
 }
 
 // Segments of one to a hundred millimetres that move together and a little each for itself.
@@ -126,6 +130,104 @@ TYPED_TEST(ContactSearch, FindsThePairsThatThereAre) {
     }
   EXPECT_GT(crossed, 50);
   EXPECT_EQ(run.contacts->begin(run.contact_step()).pairs, pairs);
+}
+
+// The search by itself, over segments that lie in one bundle, more than a list holds and more than a group,
+// so dense that each has dozens of pairs, and over others all about, some of which share cells with what is
+// far away.
+template <class T>
+class Searched {
+ public:
+  static constexpr double kRadius = 2e-5, kFarthest = 5e-4;
+
+  explicit Searched(int bundle, int about) {
+    Random random(5);
+    for (int s = 0; s < bundle; ++s)
+      add(random.vector(1).cwiseProduct(Vec3(0.001, 0.02, 0.001)), Vec3(0, 0.01, 0) + random.vector(5e-4),
+          random);
+    for (int s = 0; s < about; ++s) add(random.vector(1), random.vector(0.004), random);
+    kernels::Host host(kernels::HostThreads{run_with_tbb, nullptr});
+    const kernels::HairPlaces<T> places{start_.data(), end_.data(), strand_.data(),
+                                        static_cast<std::int32_t>(start_.size())};
+    const kernels::HairExtent extent =
+        kernels::find_extent(host, places.start, places.strand, places.particles);
+    kernels::SegmentSorter<kernels::Host, float, T> sorter;
+    const auto table =
+        sorter.sort(host, places, {extent, carried_.data(), true, 0, static_cast<float>(kFarthest)},
+                    [](int) { return true; });
+    const std::int32_t groups = (table.segments + kernels::kGroupSegments - 1) / kernels::kGroupSegments;
+    meetings.assign(start_.size(), 0);
+    std::vector<std::int32_t> hits(groups);
+    kernels::PairMemory<kernels::Host> memory;
+    memory.fill(host, groups, [&](const kernels::PairPool& pool) {
+      std::fill(meetings.begin(), meetings.end(), 0);
+      const kernels::PairSearch<float, T> search{table, meetings.data(), hits.data(), pool};
+      for (std::int32_t group = 0; group < groups; ++group) search(group);
+    });
+    for (std::int32_t group = 0; group < groups; ++group)
+      memory.pool().for_pairs(group, [&](const kernels::RankedPair& pair) { pairs.push_back(pair); });
+  }
+
+  // How many pairs each segment is in.
+  std::vector<std::int32_t> expected() const {
+    std::vector<std::int32_t> count(start_.size());
+    for (std::size_t a = 0; a < start_.size(); a += 2)
+      for (std::size_t b = a + 2; b < start_.size(); b += 2) {
+        if (length(vector_of(start_[a]) - vector_of(start_[b])) > T(0.05)) continue;
+        const auto contact = kernels::find_contact(
+            kernels::SegmentPair<T>{ends(start_, a), ends(start_, b), ends(end_, a), ends(end_, b)},
+            T(2 * kRadius), T(0));
+        if (!contact.crossed && !(contact.distance < T(kernels::kNear * 2 * kRadius))) continue;
+        const std::int32_t met = contact.crossed ? 1 + kernels::kCrossing : 1;
+        count[a] += met, count[b] += met;
+      }
+    return count;
+  }
+
+  std::vector<std::int32_t> meetings;
+  std::vector<kernels::RankedPair> pairs;
+
+ private:
+  using Places = std::vector<kernels::Place<T>>;
+
+  // A strand of one segment, which moves less far than it is looked for.
+  void add(const Vec3& begin, const Vec3& along, Random& random) {
+    const auto place = [](const Vec3& at, double extra) {
+      return kernels::Place<T>{T(at.x()), T(at.y()), T(at.z()), T(extra)};
+    };
+    for (const Vec3& at : {begin, Vec3(begin + along)}) {
+      const auto s = static_cast<std::int32_t>(start_.size() / 2);
+      strand_.push_back(start_.size() % 2 == 0 ? s : -1);
+      start_.push_back(place(at, 1)), end_.push_back(place(at + random.vector(0.3 * kFarthest), kRadius));
+      carried_.push_back({float(at.x()), float(at.y()), float(at.z()), 0});
+    }
+  }
+  static kernels::Segment<T> ends(const Places& places, std::size_t s) {
+    return {vector_of(places[s]), vector_of(places[s + 1])};
+  }
+  static kernels::Vector3<T> vector_of(const kernels::Place<T>& place) { return {place.x, place.y, place.z}; }
+
+  Places start_, end_;
+  std::vector<kernels::Place<float>> carried_;
+  std::vector<std::int32_t> strand_;
+};
+
+TYPED_TEST(ContactSearch, FindsEachPairOnceAndKeepsWhatMattersMost) {
+  const Searched<TypeParam> searched(2000, 5000);
+  EXPECT_EQ(searched.meetings, searched.expected());
+  std::map<std::int32_t, std::vector<std::int32_t>> ranks;
+  std::set<std::pair<std::int32_t, std::int32_t>> different;
+  for (const kernels::RankedPair& pair : searched.pairs) {
+    different.insert(std::minmax(pair.a, pair.b));
+    ranks[pair.a].push_back(pair.rank);
+  }
+  EXPECT_EQ(different.size(), searched.pairs.size());
+  std::size_t most = 0;
+  for (auto& [segment, its] : ranks) {
+    most = std::max(most, its.size());
+    EXPECT_EQ(std::set<std::int32_t>(its.begin(), its.end()).size(), its.size()) << "ranks of " << segment;
+  }
+  EXPECT_EQ(most, kernels::kMostPairs) << "some have more pairs than are kept";
 }
 
 }  // namespace

@@ -10,7 +10,7 @@ inline constexpr int kPairBlock = 256, kGroupSegments = 64;
 
 // Of one segment, with those that come after it in the table. In dense hair that moves far in a frame a
 // segment would meet dozens of others, all but the first of which it never gets to where those hold it.
-inline constexpr int kMostPairs = 32;
+inline constexpr int kMostPairs = 96;
 
 // `rank`: among the pairs of a, by how much they matter; of those that have not crossed, kNearRank
 // more.

@@ -143,7 +143,7 @@ class Searched {
   explicit Searched(int bundle, int about) {
     Random random(5);
     for (int s = 0; s < bundle; ++s)
-      add(random.vector(1).cwiseProduct(Vec3(0.001, 0.02, 0.001)), Vec3(0, 0.01, 0) + random.vector(5e-4),
+      add(random.vector(1).cwiseProduct(Vec3(7e-4, 0.02, 7e-4)), Vec3(0, 0.01, 0) + random.vector(5e-4),
           random);
     for (int s = 0; s < about; ++s) add(random.vector(1), random.vector(0.004), random);
     kernels::Host host(kernels::HostThreads{run_with_tbb, nullptr});
@@ -213,7 +213,7 @@ class Searched {
 };
 
 TYPED_TEST(ContactSearch, FindsEachPairOnceAndKeepsWhatMattersMost) {
-  const Searched<TypeParam> searched(2000, 5000);
+  const Searched<TypeParam> searched(3500, 3000);
   EXPECT_EQ(searched.meetings, searched.expected());
   std::map<std::int32_t, std::vector<std::int32_t>> ranks;
   std::set<std::pair<std::int32_t, std::int32_t>> different;

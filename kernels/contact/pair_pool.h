@@ -12,8 +12,7 @@ inline constexpr int kPairBlock = 256, kGroupSegments = 64;
 // segment would meet dozens of others, all but the first of which it never gets to where those hold it.
 inline constexpr int kMostPairs = 96;
 
-// `rank`: among the pairs of a, by how much they matter; of those that have not crossed, kNearRank
-// more.
+// `rank`: among the pairs of a, by how much they matter; of those that have not crossed, kNearRank more.
 inline constexpr int kNearRank = 8, kRanks = kMostPairs + kNearRank;
 struct RankedPair {
   std::int32_t a, b, rank;

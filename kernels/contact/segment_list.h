@@ -6,19 +6,6 @@
 namespace ringlet::kernels {
 inline namespace RINGLET_ISA {
 
-// The numbers of a tube lie `stride` apart.
-template <class F>
-RINGLET_KERNEL Tube<F> load_tube(const float* numbers, int stride) {
-  const auto number = [=](int k) { return load<F>(numbers + k * stride); };
-  return {number(0), number(1), {number(2), number(3)}, {number(4), number(5)}, {number(6), number(7)}};
-}
-template <class R>
-RINGLET_KERNEL void for_numbers(const Tube<R>& tube, const auto& visit) {
-  visit(0, tube.low), visit(1, tube.high);
-  for (int k = 0; k < 2; ++k)
-    visit(2 + k, tube.middle[k]), visit(4 + k, tube.slope[k]), visit(6 + k, tube.half[k]);
-}
-
 template <class F>
 struct SegmentList {
   static constexpr int kWidth = Traits<F>::kWidth, kRoom = 512, kWidest = 16, kStride = kRoom + kWidest;

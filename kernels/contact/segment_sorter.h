@@ -1,7 +1,7 @@
 // Sorts segments into a table.
 #pragma once
 #include "kernels/contact/motion_field.h"
-#include "kernels/contact/segment_list.h"
+#include "kernels/contact/segment_table.h"
 
 namespace ringlet::kernels {
 inline namespace RINGLET_ISA {
@@ -129,14 +129,14 @@ class SegmentSorter {
     });
   }
 
-  // By a mean that a few large ones do not matter to.
+  // From the largest of those on that are about as large as most: by a mean that a few large ones do not
+  // matter to.
   BoxLevels find_levels(Backend& backend, const HairExtent& extent, std::int32_t segments) {
     const CellPlace* place = cell_place_.data();
     const double per_size = backend.sum("contact sizes", segments, [=] RINGLET_LAMBDA(std::int32_t k) {
       const float half = place[k].half_size;
       return half > 0 ? 1 / static_cast<double>(half) : 0.0;
     });
-    // The largest of those that are about as large as most.
     const double most = per_size > 0 ? 1.5 * segments / per_size : 1;
     const double first =
         backend.largest("contact sizes", segments, 0.5 * most, [=] RINGLET_LAMBDA(std::int32_t k) {

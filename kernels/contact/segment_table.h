@@ -1,9 +1,9 @@
 // Where to look for a segment's neighbours: a uniform spatial hash of segments, in levels by size.
 //
-// A level takes segments up to twice the size of the level before it. Cells are numbered modulo a power of
-// two along each axis, so that a strand that was flung far away costs no memory. The table holds the segments
-// sorted by cell, and in a cell by the axis that they run along most; along x cells lie one after the other
-// in memory.
+// A level takes segments up to twice the size of the level before it, in cells half as wide as the largest.
+// Cells are numbered modulo a power of two along each axis, so that a strand that was flung far away costs no
+// memory. The table holds the segments sorted by cell, and in a cell by the axis that they run along most;
+// along x cells lie one after the other in memory.
 #pragma once
 #include "kernels/contact/contact_data.h"
 #include "kernels/contact/tube.h"
@@ -29,7 +29,6 @@ struct BoxLevel {
 };
 
 struct BoxLevels {
-  static constexpr float kCellsPerHalf = 1;
   float low[3];  // [m]
   BoxLevel level[kLevels];
   std::int32_t total_cells;
@@ -42,7 +41,7 @@ struct BoxLevels {
     for (int k = 0; k < kLevels; ++k) {
       BoxLevel& level = levels.level[k];
       level.half_size = k == 0 ? first_half_size : 2 * levels.level[k - 1].half_size;
-      level.per_cell = kCellsPerHalf / level.half_size;
+      level.per_cell = 1 / level.half_size;
       level.first_cell = levels.total_cells;
       levels.total_cells += share_cells(level, low, high, boxes);
     }

@@ -50,9 +50,9 @@ struct ContactStrands {
   // Calls visit(pair's record, whether the segment is its b).
   template <class Visit>
   RINGLET_KERNEL void for_contacts(std::int32_t segment, const Visit& visit) const {
-    // Records lie about in memory, as the segments' partners do.
     for (std::int32_t k = lists.first[segment]; k < lists.first[segment + 1]; ++k) {
       const std::int32_t entry = lists.entry[k], pair = entry >> 1;
+      // Records lie about in memory, as the segments' partners do.
       prefetch(&pairs.record[lists.entry[k + lists.kPadding] >> 1]);
       if (pairs.active[pair]) visit(pairs.record[pair], (entry & 1) != 0);
     }

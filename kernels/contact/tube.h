@@ -69,7 +69,7 @@ struct Tube {
   }
 };
 
-// The first of a pack's tubes for all lanes.
+// One tube for all lanes.
 template <class R>
 RINGLET_KERNEL Tube<R> same_tube(const Tube<Scalar<R>>& one) {
   return {R(one.low),
@@ -77,6 +77,20 @@ RINGLET_KERNEL Tube<R> same_tube(const Tube<Scalar<R>>& one) {
           {R(one.middle[0]), R(one.middle[1])},
           {R(one.slope[0]), R(one.slope[1])},
           {R(one.half[0]), R(one.half[1])}};
+}
+
+// In memory the numbers of tubes lie `stride` apart, in the order in which this visits them as visit(k,
+// number).
+template <class R, class Visit>
+RINGLET_KERNEL void for_numbers(const Tube<R>& tube, const Visit& visit) {
+  visit(0, tube.low), visit(1, tube.high);
+  for (int k = 0; k < 2; ++k)
+    visit(2 + k, tube.middle[k]), visit(4 + k, tube.slope[k]), visit(6 + k, tube.half[k]);
+}
+template <class R>
+RINGLET_KERNEL Tube<R> load_tube(const Scalar<R>* numbers, int stride) {
+  const auto number = [=](int k) { return load<R>(numbers + k * stride); };
+  return {number(0), number(1), {number(2), number(3)}, {number(4), number(5)}, {number(6), number(7)}};
 }
 
 }  // namespace RINGLET_ISA

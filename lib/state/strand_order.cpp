@@ -4,19 +4,19 @@
 #include <cstdint>
 #include <numeric>
 
+#include "kernels/backend/morton.h"
+
 namespace ringlet::state {
 namespace {
 
-// Where each strand's root lies on a curve that fills their bounding box, the Z-order of its cells (Morton
-// 1966): what is near one another on it is so in space.
+// Where each strand's root lies on a curve that fills their bounding box.
 template <class T>
 std::vector<std::uint64_t> places_on_curve(const StrandLayout& layout, const StrandState<T>& state) {
-  constexpr int kBits = 20;  // of an axis
+  constexpr double kCells = 1 << 20;  // along the longest axis
   const auto strands = static_cast<std::int32_t>(layout.strands());
   const auto root = [&](std::int32_t strand, int c) {
     return state.root_points[layout.at_strand(strand, 3, c)];
   };
-  std::vector<std::uint64_t> places(strands);
   double low[3], longest = 0;
   for (int c = 0; c < 3; ++c) {
     double high = low[c] = strands == 0 ? 0 : root(0, c);
@@ -24,13 +24,14 @@ std::vector<std::uint64_t> places_on_curve(const StrandLayout& layout, const Str
       low[c] = std::min(low[c], root(strand, c)), high = std::max(high, root(strand, c));
     longest = std::max(longest, high - low[c]);
   }
-  const double most = (1 << kBits) - 1, per_length = longest > 0 ? most / longest : 0;
+  const double per_length = longest > 0 ? (kCells - 1) / longest : 0;
+  const auto cell = [&](std::int32_t strand, int c) {
+    const double at = (root(strand, c) - low[c]) * per_length;
+    return at > 0 ? static_cast<std::uint32_t>(std::min(at, kCells - 1)) : 0;  // 0 for what is not a number
+  };
+  std::vector<std::uint64_t> places(strands);
   for (std::int32_t strand = 0; strand < strands; ++strand)
-    for (int c = 0; c < 3; ++c) {
-      const double at = (root(strand, c) - low[c]) * per_length;  // 0 also for what is not a number
-      const std::uint64_t cell = at > 0 ? static_cast<std::uint64_t>(std::min(at, most)) : 0;
-      for (int bit = 0; bit < kBits; ++bit) places[strand] |= (cell >> bit & 1) << (3 * bit + c);
-    }
+    places[strand] = kernels::key_of(cell(strand, 0), cell(strand, 1), cell(strand, 2));
   return places;
 }
 

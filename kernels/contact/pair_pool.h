@@ -58,15 +58,16 @@ struct PairWriter {
 template <class Backend>
 class PairMemory {
  public:
-  // Calls search(pool), which is to fill the pool's groups: again with more memory where that was too little.
+  // Calls search(pool), which is to fill the pool's groups: again with more memory where that was too little,
+  // and more than that, for pairs that grow in number frame by frame would be looked for twice in each.
   template <class Search>
   void fill(Backend& backend, std::int32_t groups, const Search& search) {
     groups_ = groups;
     last_.resize(groups), count_.resize(groups), taken_.resize(1);
-    std::int32_t needed = groups + groups / 2 + 1;
+    std::int32_t needed = groups + 1;
     do {
-      if (static_cast<std::size_t>(needed) > next_.size())
-        next_.resize(needed), pairs_.resize(static_cast<std::size_t>(needed) * kPairBlock);
+      if (const std::int32_t room = needed + needed / 2; needed > static_cast<std::int32_t>(next_.size()))
+        next_.resize(room), pairs_.resize(static_cast<std::size_t>(room) * kPairBlock);
       std::int32_t* taken = taken_.data();
       backend.parallel_for("clear pool", 1, [=] RINGLET_LAMBDA(std::int32_t) { *taken = 0; });
       search(pool());

@@ -107,7 +107,8 @@ class StandingCrossings {
       backend.parallel_for("find standing", (pairs.count + kWidth - 1) / kWidth, found, kPackChunk);
       count_ = static_cast<std::int32_t>(backend.largest(
           "standing", 1, 0, [=] RINGLET_LAMBDA(std::int32_t) { return static_cast<double>(*taken); }));
-      if (count_ > room) key_.resize(count_), order_.resize(count_);
+      const std::int32_t grown = count_ + count_ / 2;  // there will be more in the frames that follow
+      if (count_ > room) key_.resize(grown), order_.resize(grown);
     } while (count_ > room);
     std::uint32_t* order = order_.data();
     backend.parallel_for("order standing", count_, [=] RINGLET_LAMBDA(std::int32_t k) { order[k] = 0; });

@@ -22,7 +22,7 @@ class Neighbours {
 
   // Returns how many pairs were found, some of them in several rounds; they hold until the next call.
   std::int32_t find(Backend& backend, const HairPlaces<T>& places) {
-    const HairExtent extent = find_extent(backend, places.start, places.strand, places.particles);
+    const HairExtent extent = extent_.find(backend, places.start, places.strand, places.particles);
     rounds_taken_ = 0;
     if (extent.segments == 0) return 0;
     most_looked_at_ = max(static_cast<double>(kMostLookedAt), 2.0 * extent.segments);
@@ -39,8 +39,8 @@ class Neighbours {
   std::size_t bytes() const {
     std::size_t rounds = 0;
     for (const auto& round : rounds_) rounds += round.bytes();
-    return rounds + motion_.bytes() + sorter_.bytes() + crowd_.bytes() + meetings_.bytes() + hits_.bytes() +
-           last_round_.bytes() + kept_.bytes() + ranks_.bytes() + a_.bytes() + b_.bytes();
+    return rounds + extent_.bytes() + motion_.bytes() + sorter_.bytes() + crowd_.bytes() + meetings_.bytes() +
+           hits_.bytes() + last_round_.bytes() + kept_.bytes() + ranks_.bytes() + a_.bytes() + b_.bytes();
   }
 
  private:
@@ -213,6 +213,7 @@ class Neighbours {
   static constexpr std::int64_t kMostLookedAt = 1 << 18;
   static constexpr std::int32_t kLeastPairs = 1;
 
+  ExtentFinder<Backend, T> extent_;
   MotionField<Backend, T> motion_;
   SegmentSorter<Backend, F, T> sorter_;
   PairMemory<Backend> rounds_[kRounds];

@@ -166,6 +166,11 @@ struct SampleWeights {
     set<kFaceLanes<2>>(z, spread<2>(within));
   }
   RINGLET_KERNEL int node(int j, int k) const { return corner + (k * kHaloEdge + j) * kHaloEdge; }
+  // The halo's rows along x that these are of, a bit for each.
+  RINGLET_KERNEL std::uint64_t rows() const {
+    constexpr std::uint64_t kThree = 7, kNine = kThree | kThree << kHaloEdge | kThree << 2 * kHaloEdge;
+    return kNine << (corner / kHaloEdge);
+  }
 
  private:
   template <int kFace>
@@ -183,13 +188,18 @@ RINGLET_FUNCTION void tile_corner(const GridData<T>& g, std::int32_t tile, std::
     corner[c] = kTileEdge * static_cast<std::int32_t>(gather_bits(g.tile_key[tile] >> c));
 }
 
-// Calls visit(node of the halo, node of the grid) for those that exist.
+inline constexpr std::uint64_t kAllRows = (std::uint64_t{1} << kHaloEdge * kHaloEdge) - 1;
+
+// Calls visit(node of the halo, node of the grid) for those that exist of the rows along x whose bits are
+// set.
 template <class T, class Visit>
-RINGLET_FUNCTION void for_each_halo_node(const GridData<T>& g, std::int32_t tile, const Visit& visit) {
+RINGLET_FUNCTION void for_each_halo_node(const GridData<T>& g, std::int32_t tile, std::uint64_t rows,
+                                         const Visit& visit) {
   const std::int32_t* near = g.near + static_cast<std::int64_t>(tile) * kAround;
   const auto side = [](int a) { return a == 0 ? 0 : a <= kTileEdge ? 1 : 2; };
   for (int k = 0; k < kHaloEdge; ++k)
     for (int j = 0; j < kHaloEdge; ++j) {
+      if (!(rows >> (k * kHaloEdge + j) & 1)) continue;
       const std::int32_t* row = near + (side(k) * 3 + side(j)) * 3;
       const int cells = cell_in_tile(0, (j - 1) & 3, (k - 1) & 3), halo = (k * kHaloEdge + j) * kHaloEdge;
       RINGLET_UNROLL
@@ -303,7 +313,7 @@ RINGLET_FUNCTION void scatter_tile(const GridData<T>& g, std::int32_t occupied) 
   const Octet<T> scale = Octet<T>::load(g.scale);
   alignas(64) Fixed<T> sums[kHaloNodes * kNodeValues];
   for (int n = 0; n < kHaloNodes * kNodeValues; ++n) sums[n] = 0;
-  for_each_halo_node(g, tile, [&](int, std::int64_t node) { prefetch(sums_of(g, node)); });
+  std::uint64_t rows = 0;
   for_each_piece_of_tile(g, occupied, [&](const Piece& piece, const Segment<T>& segment) {
     const T* rest = g.rest_density + (piece.rest - piece.first);
     const Octet<T> one(T(1)), length(segment.sample_length());
@@ -313,10 +323,11 @@ RINGLET_FUNCTION void scatter_tile(const GridData<T>& g, std::int32_t occupied) 
       const Octet<T> hair = length * choose<1 << kTarget>(Octet<T>(rest[s]), one);
       const Octet<T> moved = Octet<T>(a) * first + Octet<T>(b) * second;
       const Octet<T> value = choose<1 << kDensity | 1 << kTarget>(hair, moved);
-      add_sample(SampleWeights<T>(corner, segment.place(t)), value * scale, sums);
+      const SampleWeights<T> weights(corner, segment.place(t));
+      add_sample(weights, value * scale, sums), rows |= weights.rows();
     }
   });
-  for_each_halo_node(g, tile, [&](int halo, std::int64_t node) {
+  for_each_halo_node(g, tile, rows, [&](int halo, std::int64_t node) {
     Fixed<T>* to = sums_of(g, node);
     (Octet<Fixed<T>>::load(to) + Octet<Fixed<T>>::load(sums + halo * kNodeValues)).store(to);
   });
@@ -381,7 +392,7 @@ RINGLET_FUNCTION void gather_tile(const GridData<T>& g, std::int32_t occupied) {
   for (int n = 0; n < kHaloNodes * kNodeValues; ++n) values[n] = T(0);
   for (std::int32_t q = g.tile_piece[occupied]; q < g.tile_piece[occupied + 1]; ++q)
     prefetch(given_back_to(g, g.tile_pieces[q].number));
-  for_each_halo_node(g, tile, [&](int halo, std::int64_t node) {
+  for_each_halo_node(g, tile, kAllRows, [&](int halo, std::int64_t node) {
     Octet<T>::load(g.node + node * kNodeValues).store(values + halo * kNodeValues);
   });
   for_each_piece_of_tile(g, occupied, [&](const Piece& piece, const Segment<T>& segment) {
@@ -438,8 +449,9 @@ RINGLET_FUNCTION void rest_densities(const GridData<T>& g, std::int32_t occupied
   tile_corner(g, tile, corner);
   T density[kHaloNodes];
   for (int n = 0; n < kHaloNodes; ++n) density[n] = T(0);
-  for_each_halo_node(
-      g, tile, [&](int halo, std::int64_t node) { density[halo] = g.node[node * kNodeValues + kDensity]; });
+  for_each_halo_node(g, tile, kAllRows, [&](int halo, std::int64_t node) {
+    density[halo] = g.node[node * kNodeValues + kDensity];
+  });
   for_each_piece_of_tile(g, occupied, [&](const Piece& piece, const Segment<T>& segment) {
     for (std::int32_t s = piece.first; s < piece.end; ++s) {
       const SampleWeights<T> w(corner, segment.place(segment.parameter(s)));

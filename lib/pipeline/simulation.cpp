@@ -137,7 +137,8 @@ class TypedSimulation : public Simulation {
     if (!scene_.effects.grooming.empty())
       grooming_.emplace(scene_, world_.simulated.groom_of_strand, model_, state_);
     if (grooming_ && scene_.frames.preroll == 0) rehearse_first_frame();
-    if (scene_.effects.hair_hair) start(), tell_rest();  // stages take their memory at rest
+    if (scene_.effects.hair_hair)
+      start(), tell_rest(), rest_told_ = true;  // stages take their memory at rest
     make_plan();
   }
 
@@ -187,7 +188,8 @@ class TypedSimulation : public Simulation {
   scene::Scene scene_;
   Options options_;
   World world_;
-  const Roots& roots_;  // of the simulated strands
+  const Roots& roots_;      // of the simulated strands
+  bool rest_told_ = false;  // the stages know the rest state that the next run begins with
   state::StrandModel<T> model_;
   state::StrandState<T> state_;
   std::unique_ptr<effects::Executor<T>> executor_;
@@ -496,11 +498,12 @@ bool TypedSimulation<T>::run(const FrameRange& range, state::FrameSink& sink, co
   report_ = empty_report(roots_.strands());
   probe_ = control.probe;
   start();
+  const bool rest_told = std::exchange(rest_told_, false);
   if (control.resume) {
     frame = control.resume->frame;
     resume(*control.resume);
   } else {
-    tell_rest();
+    if (!rest_told) tell_rest();
     groom(frame);
     if (frame >= range.first) hand_on(frame, frame_now(frame), 0, sink);
   }

@@ -149,8 +149,8 @@ class Searched {
     kernels::Host host(kernels::HostThreads{run_with_tbb, nullptr});
     const kernels::HairPlaces<T> places{start_.data(), end_.data(), strand_.data(),
                                         static_cast<std::int32_t>(start_.size())};
-    const kernels::HairExtent extent =
-        kernels::find_extent(host, places.start, places.strand, places.particles);
+    kernels::ExtentFinder<kernels::Host, T> finder;
+    const kernels::HairExtent extent = finder.find(host, places.start, places.strand, places.particles);
     kernels::SegmentSorter<kernels::Host, float, T> sorter;
     const auto table =
         sorter.sort(host, places, {extent, carried_.data(), true, 0, static_cast<float>(kFarthest)},

@@ -39,10 +39,11 @@ class HairRun {
   static constexpr double kFrame = 1.0 / 24, kStep = kFrame / kSubsteps;
 
   HairRun(const std::vector<HairStrand>& strands, double radius, int clamped,
-          InstructionSet set = kernels::best_instruction_set())
+          InstructionSet set = kernels::best_instruction_set(),
+          kernels::HostThreads threads = {run_with_tbb, nullptr})
       : model(input_of(strands)),
         state(model),
-        contacts(kernels::make_hair_contacts<T>(set, {run_with_tbb, nullptr})),
+        contacts(kernels::make_hair_contacts<T>(set, threads)),
         kernels_(kernels::cpu_kernels<T>(set)) {
     step.clamped = clamped, step.friction = T(0.3);
     poses_.resize(strands.size());

@@ -86,6 +86,12 @@ class GridHair {
 
   kernels::GridFigures run() { return grid_->run(told()); }
   std::size_t bytes() const { return grid_->bytes(); }
+  // The share of a wind that reaches the segments that begin at particles, as rows are laid out.
+  state::AlignedVector<T> shelter(const Vec3& wind, double strength, double radius) {
+    state::AlignedVector<T> share(model.layout.rows() * kernels::kLanes, T(1));
+    grid_->shelter({{wind.x(), wind.y(), wind.z()}, strength, radius, share.data()});
+    return share;
+  }
 
   template <class Visit>  // visit(strand, particle)
   void for_each(const Visit& visit) const {

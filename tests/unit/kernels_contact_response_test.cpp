@@ -238,6 +238,24 @@ TYPED_TEST(ContactResponse, AStrandFarAwayChangesNothingHere) {
   EXPECT_NEAR(contacts_with({broken}), alone, 0.01 * alone);
 }
 
+// Of more pairs than contacts may look at, those that matter most are taken, and the rest does no harm.
+TYPED_TEST(ContactResponse, ABundleOfMorePairsThanThereIsRoomForKeepsItsMomentum) {
+  constexpr int kStrands = 600, kMostPairs = 1 << 18;  // some 900,000 pairs of segments lie within reach
+  auto strands = this->tangle(kStrands);
+  for (HairStrand& strand : strands)
+    for (int i = 0; i < 6; ++i)
+      strand.points[i] = Vec3(5e-3 * strand.points[0].x(), 0.008 * i, 5e-3 * strand.points[0].z());
+  HairRun<TypeParam> run(strands, kRadius, 0);
+  this->fly(run);
+  const auto before = this->sums_of(run);
+  const HairContactFigures found = this->one_pass(run);
+  const auto after = this->sums_of(run);
+  EXPECT_LE(found.pairs, kMostPairs);
+  EXPECT_GT(found.pairs, kMostPairs / 2);
+  EXPECT_NEAR((after.momentum - before.momentum).norm(), 0, this->either(1e-11, 1e-4));
+  EXPECT_LT(after.energy, 0.95 * before.energy);
+}
+
 TYPED_TEST(ContactResponse, AThingThatMovesAsAWholeIsLeftAlone) {
   // At 30 m/s, turning by a third of a revolution a frame.
   HairRun<TypeParam> run(this->tangle(60), kRadius, 0);

@@ -450,6 +450,39 @@ TYPED_TEST(KernelGrid, OutlivesWhatIsNoNumber) {
     }
 }
 
+// ---- Shelter
+
+// In hair that is the same everywhere the wind decays as exp(-strength 2 r n x), x the way through it.
+TYPED_TEST(KernelGrid, LetsThroughOfTheWindWhatBeerAndLambertSay) {
+  constexpr double kSize = 16 * kCell, kTile = 4 * kCell, kRadius = 5e-5, kStrength = 0.7;
+  constexpr double kPerLength = kStrength * 2 * kRadius / (kSpacing * kSpacing);  // 1 / kSpacing^2 is n
+  auto hair = this->hair_of(hair_block({0, 0, 0}, {kSize, kSize, kSize}, kSpacing, 17));
+  hair.run();
+  for (const Vec3& wind :
+       {Vec3(3, 0, 0), Vec3(-3, 0, 0), Vec3(0, 0, 1), Vec3(0, 0, -1), Vec3(2, 0, 2), Vec3(-2, 0, 2)}) {
+    const auto share = hair.shelter(wind, kStrength, kRadius);
+    int looked_at = 0;
+    hair.for_each([&](std::size_t s, int i) {
+      if (i + 1 == hair.model.living(s)) return;
+      const Vec3 x = 0.5 * (hair.position(s, i) + hair.position(s, i + 1));
+      double ways[2];  // to the sides that the wind comes in by
+      for (int k = 0; k < 2; ++k) {
+        const double along = wind[2 * k], to_side = along > 0 ? x[2 * k] : kSize - x[2 * k];
+        ways[k] = along != 0 ? to_side * wind.norm() / std::abs(along) : 1;
+      }
+      // Depths are blended between tiles, and hair spreads over its sides by a part of a cell: what is near
+      // a side or between two is left out.
+      const double nearest = std::min({x.x(), x.y(), x.z(), kSize - x.x(), kSize - x.y(), kSize - x.z()});
+      if (nearest < kTile || std::abs(ways[0] - ways[1]) < kTile) return;
+      const double depth = kPerLength * std::min(ways[0], ways[1]);
+      EXPECT_NEAR(-std::log(share[hair.model.layout.at(s, i, 1, 0)]), depth, 0.15 * kPerLength * kTile)
+          << "at " << x.transpose() << ", wind " << wind.transpose();
+      ++looked_at;
+    });
+    EXPECT_GT(looked_at, 1000);
+  }
+}
+
 TYPED_TEST(KernelGrid, HasNothingToDoWithoutHair) {
   auto hair = this->hair_of({{{0, 0, 0}}, {{1, 0, 0}}});
   const kernels::GridFigures told = hair.run();

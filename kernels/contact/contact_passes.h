@@ -4,6 +4,7 @@
 // threads, or on the order of strands. What one contact gives to a particle of one segment it takes from the
 // other's.
 #pragma once
+#include "kernels/backend/words.h"
 #include "kernels/contact/contact_response.h"
 
 namespace ringlet::kernels {
@@ -34,6 +35,18 @@ RINGLET_KERNEL R load_sides(const signed char* side) {
   return load<R>(sides);
 }
 
+// Asks for what the pack some packs after this one will read: partners lie about in memory.
+template <class R>
+RINGLET_KERNEL void fetch_ahead(const ContactPairs<Scalar<R>>& pairs, const HairPlaces<Scalar<R>>& places,
+                                std::int32_t first) {
+  constexpr std::int32_t kWidth = Traits<R>::kWidth, kAhead = 4 * kWidth;
+  if (pairs.count - first < kAhead + kWidth) return;
+  for (int lane = 0; lane < kWidth; ++lane) {
+    const std::int32_t b = pairs.b[first + kAhead + lane];
+    prefetch(&places.start[b]), prefetch(&places.end[b]);
+  }
+}
+
 // Contacts as places are now. For a pack of pairs.
 template <class R>
 struct FindContacts {
@@ -44,6 +57,7 @@ struct FindContacts {
 
   RINGLET_FUNCTION void operator()(std::int32_t pack) const {
     const std::int32_t first = pack * kWidth;
+    fetch_ahead<R>(pairs, places, first);
     const PackOfPairs<R> gathered(places, pairs.a + first, pairs.b + first);
     const SegmentPair<R> pair = gathered.places();
     const R reach = gathered.largest_reach();

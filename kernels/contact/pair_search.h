@@ -158,6 +158,7 @@ struct PairSearch {
     const SegmentPlaces<T>& own = table.places[i];
     const Segment<R> start = segment_at<R>(&own.start.begin, 0), end = segment_at<R>(&own.end.begin, 0);
     const R radius(max(own.end.begin.extra, own.end.end.extra)), strand(own.start.begin.extra);
+    for (int k = 0; k < count; ++k) prefetch(&table.places[hits.at[k]]);
     for (int k = count; k % kPairs; ++k) hits.at[k] = i;
     for (int k = 0; k < count; k += kPairs) {
       alignas(64) std::int32_t quads[kPairs];

@@ -22,6 +22,7 @@ struct FindStanding {
 
   RINGLET_FUNCTION void operator()(std::int32_t pack) const {
     const std::int32_t first = pack * kWidth;
+    fetch_ahead<R>(pairs, places, first);
     const PackOfPairs<R> gathered(places, pairs.a + first, pairs.b + first);
     const SegmentPair<R> pair = gathered.places();
     const R side = load_sides<R>(pairs.side + first);

@@ -10,21 +10,24 @@
 namespace ringlet::kernels {
 inline namespace RINGLET_ISA {
 
-// What is known of a pair in a pass.
+// Where a pair touches: s, u and the gap in x, y and z.
 template <class T>
-struct ContactRecord {
-  T s, u;
-  T normal[3];  // then the impulse on places
-  T slip[3];    // then the impulse on velocities
-  T gap;
+using Touch = Place<T>;
+
+// What a contact does: vectors in x, y and z; s, then u.
+template <class T>
+struct alignas(8 * sizeof(T)) ContactRecord {
+  Place<T> on_place;     // the normal, then the impulse on places
+  Place<T> on_velocity;  // the slip, then the impulse on velocities
 };
 
 template <class T>
 struct ContactPairs {
   const std::int32_t *a, *b;  // [pairs]
   const signed char* side;    // [pairs] see find_contact
+  Touch<T>* touch;            // [pairs]
   ContactRecord<T>* record;   // [pairs]
-  unsigned char* active;      // [pairs]
+  unsigned char* active;      // [pairs] 0: no contact, 2: of segments that have crossed
   std::int32_t count;
 };
 
@@ -69,28 +72,14 @@ struct FindContacts {
     if (pairs.count - first < kWidth) active &= ~(~0u << (pairs.count - first));
     for (int lane = 0; lane < kWidth; ++lane) pairs.active[first + lane] = active >> lane & 1;
     if (active == 0) return;
+    for (std::uint32_t crossed = lane_bits(contact.crossed) & active; crossed; crossed &= crossed - 1)
+      pairs.active[first + __builtin_ctz(crossed)] = 2;
     const Vector3<R> before = pair.a_start.at(contact.s) - pair.b_start.at(contact.u),
                      after = pair.a.at(contact.s) - pair.b.at(contact.u);
-    const Vector3<R> slip = contact.later * across(contact.normal, after - before);
-    write(first, active, contact, slip, gap);
-  }
-
- private:
-  RINGLET_KERNEL void write(std::int32_t first, std::uint32_t active, const PairContact<R>& contact,
-                            Vector3<R> slip, R gap) const {
-    alignas(64) T lanes[9][kWidth];
-    store(lanes[0], contact.s), store(lanes[1], contact.u);
-    store3<R>(lanes[2], kWidth, contact.normal), store3<R>(lanes[5], kWidth, slip), store(lanes[8], gap);
-    const std::uint32_t crossed = lane_bits(contact.crossed);
-    for (std::uint32_t left = active; left; left &= left - 1) {
-      const int lane = __builtin_ctz(left);
-      pairs.record[first + lane] = {lanes[0][lane],
-                                    lanes[1][lane],
-                                    {lanes[2][lane], lanes[3][lane], lanes[4][lane]},
-                                    {lanes[5][lane], lanes[6][lane], lanes[7][lane]},
-                                    lanes[8][lane]};
-      if (crossed >> lane & 1) pairs.active[first + lane] = 2;
-    }
+    const Vector3<R> slip = contact.later * across(contact.normal, after - before), normal = contact.normal;
+    store_quads<R>(&pairs.touch[first].x, 1, {contact.s, contact.u, gap, R(0)});
+    store_quads<R>(&pairs.record[first].on_place.x, 2, {normal.x, normal.y, normal.z, contact.s});
+    store_quads<R>(&pairs.record[first].on_velocity.x, 2, {slip.x, slip.y, slip.z, contact.u});
   }
 };
 
@@ -109,29 +98,23 @@ struct WeighContacts {
 
   RINGLET_FUNCTION void operator()(std::int32_t pack) const {
     const std::int32_t first = pack * kWidth;
-    alignas(64) T lanes[9][kWidth];
     bool any_active = false;
     for (int lane = 0; lane < kWidth; ++lane) any_active = any_active || pairs.active[first + lane];
     if (!any_active) return;
-    for (int lane = 0; lane < kWidth; ++lane) {
-      const ContactRecord<T>& record = pairs.record[first + lane];
-      lanes[0][lane] = record.s, lanes[1][lane] = record.u, lanes[8][lane] = record.gap;
-      for (int c = 0; c < 3; ++c) lanes[2 + c][lane] = record.normal[c], lanes[5 + c][lane] = record.slip[c];
-    }
-    const R s = load<R>(lanes[0]), u = load<R>(lanes[1]), gap = load<R>(lanes[8]);
-    const Vector3<R> normal = load3<R>(lanes[2], kWidth), slip = load3<R>(lanes[5], kWidth);
+    T *on_place = &pairs.record[first].on_place.x, *on_velocity = &pairs.record[first].on_velocity.x;
+    const Quad<R> place = load_quads<R>(on_place, 2), way = load_quads<R>(on_velocity, 2);
+    const R s = place.w, u = way.w, gap = load_quads<R>(&pairs.touch[first].x, 1).z;
+    const Vector3<R> normal = vector_of(place), slip = vector_of(way);
     const GatheredSegment<R> a = gather_segment<R>(velocity, pairs.a + first),
                              b = gather_segment<R>(velocity, pairs.b + first);
     const R per_mass = inverse_or_zero(a.extra_at(s) + b.extra_at(u), R(T(1e-6)));
     const Vector3<R> speed = a.places.at(s) - b.places.at(u);
     const R mu(friction);
-    store3<R>(lanes[2], kWidth, contact_impulse(normal, -gap, R(T(kRelaxation)), slip, mu, per_mass));
-    store3<R>(lanes[5], kWidth,
-              contact_impulse(normal, -dot(normal, speed), R(1), across(normal, speed), mu, per_mass));
-    for (int lane = 0; lane < kWidth; ++lane) {
-      ContactRecord<T>& record = pairs.record[first + lane];
-      for (int c = 0; c < 3; ++c) record.normal[c] = lanes[2 + c][lane], record.slip[c] = lanes[5 + c][lane];
-    }
+    const Vector3<R> moves = contact_impulse(normal, -gap, R(T(kRelaxation)), slip, mu, per_mass),
+                     turns = contact_impulse(normal, -dot(normal, speed), R(1), across(normal, speed), mu,
+                                             per_mass);
+    store_quads<R>(on_place, 2, {moves.x, moves.y, moves.z, s});
+    store_quads<R>(on_velocity, 2, {turns.x, turns.y, turns.z, u});
   }
 };
 

@@ -60,12 +60,12 @@ class ContactSolver : public HairContacts<Scalar<R>> {
     lay_out_end(step);
     find();
     const unsigned char* active = active_.data();
-    const ContactRecord<T>* record = record_.data();
+    const Touch<T>* touch = touch_.data();
     figures.crossings = static_cast<std::int64_t>(backend_.sum(
         "count crossings", pairs_.count,
-        [=] RINGLET_LAMBDA(std::int32_t k) { return active[k] == 2 && record[k].gap < T(0) ? 1.0 : 0.0; }));
+        [=] RINGLET_LAMBDA(std::int32_t k) { return active[k] == 2 && touch[k].z < T(0) ? 1.0 : 0.0; }));
     figures.depth = backend_.largest("depth", pairs_.count, 0, [=] RINGLET_LAMBDA(std::int32_t k) {
-      return active[k] == 1 ? -static_cast<double>(record[k].gap) : 0.0;
+      return active[k] == 1 ? -static_cast<double>(touch[k].z) : 0.0;
     });
   }
 
@@ -86,9 +86,9 @@ class ContactSolver : public HairContacts<Scalar<R>> {
 
   std::size_t bytes() const override {
     return backend_.bytes() + first_.bytes() + strand_.bytes() + start_.bytes() + end_.bytes() +
-           velocity_.bytes() + list_first_.bytes() + list_entry_.bytes() + cursor_.bytes() + record_.bytes() +
-           active_.bytes() + list_.bytes() + load_.bytes() + kappa_.bytes() + neighbours_.bytes() +
-           standing_.bytes();
+           velocity_.bytes() + list_first_.bytes() + list_entry_.bytes() + cursor_.bytes() + touch_.bytes() +
+           record_.bytes() + active_.bytes() + list_.bytes() + load_.bytes() + kappa_.bytes() +
+           neighbours_.bytes() + standing_.bytes();
   }
 
  private:
@@ -186,10 +186,10 @@ class ContactSolver : public HairContacts<Scalar<R>> {
   void index_pairs() {
     const std::int32_t pairs = pairs_.count;
     load_.resize(particles_), kappa_.resize(first_.size() - 1);
-    record_.resize(pairs + kWidth), active_.resize(pairs + kWidth);
+    touch_.resize(pairs + kWidth), record_.resize(pairs + kWidth), active_.resize(pairs + kWidth);
     list_first_.resize(particles_ + 1), cursor_.resize(particles_),
         list_entry_.resize(2 * static_cast<std::size_t>(pairs) + ContactLists::kPadding);
-    pairs_ = {list_.a(), list_.b(), list_.side(), record_.data(), active_.data(), pairs};
+    pairs_ = {list_.a(), list_.b(), list_.side(), touch_.data(), record_.data(), active_.data(), pairs};
     std::int32_t *first = list_first_.data(), *cursor = cursor_.data(), *entry = list_entry_.data();
     const std::int32_t *a = pairs_.a, *b = pairs_.b;
     backend_.parallel_for("clear lists", particles_ + 1,
@@ -260,6 +260,7 @@ class ContactSolver : public HairContacts<Scalar<R>> {
   std::int32_t particles_ = 0;
   Buffer<Place<T>> start_, end_, velocity_;
   Buffer<std::int32_t> first_, strand_, list_first_, list_entry_, cursor_;
+  Buffer<Touch<T>> touch_;
   Buffer<ContactRecord<T>> record_;
   Buffer<unsigned char> active_;
   Buffer<ParticleLoad> load_;

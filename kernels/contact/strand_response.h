@@ -47,14 +47,14 @@ struct ContactStrands {
     return first_particle[strand + 1] - first_particle[strand];
   }
 
-  // Calls visit(pair's record, whether the segment is its b).
-  template <class Visit>
-  RINGLET_KERNEL void for_contacts(std::int32_t segment, const Visit& visit) const {
+  // Calls visit(what `known` tells of the pair, whether the segment is its b).
+  template <class Known, class Visit>
+  RINGLET_KERNEL void for_contacts(std::int32_t segment, const Known* known, const Visit& visit) const {
     for (std::int32_t k = lists.first[segment]; k < lists.first[segment + 1]; ++k) {
       const std::int32_t entry = lists.entry[k], pair = entry >> 1;
-      // Records lie about in memory, as the segments' partners do.
-      prefetch(&pairs.record[lists.entry[k + lists.kPadding] >> 1]);
-      if (pairs.active[pair]) visit(pairs.record[pair], (entry & 1) != 0);
+      // Pairs lie about in memory, as the segments' partners do.
+      prefetch(&known[lists.entry[k + lists.kPadding] >> 1]);
+      if (pairs.active[pair]) visit(known[pair], (entry & 1) != 0);
     }
   }
 
@@ -99,10 +99,10 @@ struct FindResponse {
       double here = carried;
       carried = 0;
       if (i + 1 < n) {
-        strands.for_contacts(p, [&](const ContactRecord<T>& record, bool second) {
-          const double share = summable(second ? record.u : record.s);
+        strands.for_contacts(p, strands.pairs.touch, [&](const Touch<T>& touch, bool second) {
+          const double share = summable(second ? touch.y : touch.x);
           here += 1 - share, carried += share, touched = true;
-          depth = -record.gap > depth ? -record.gap : depth;
+          depth = -touch.z > depth ? -touch.z : depth;
         });
         length += kernels::length(vector_of(strands.start[p + 1]) - vector_of(strands.start[p]));
       }
@@ -130,11 +130,12 @@ struct ApplyContacts {
     for (std::int32_t i = 0, p = first; i + 1 < n; ++i, ++p) {
       ParticleLoad &begin = strands.load[p], &finish = strands.load[p + 1];
       for (int k = 0; k < kLoads; ++k) finish.value[k] = 0;
-      strands.for_contacts(p, [&](const ContactRecord<T>& record, bool second) {
-        const double share = second ? record.u : record.s, sign = second ? -1 : 1;
+      strands.for_contacts(p, strands.pairs.record, [&](const ContactRecord<T>& record, bool second) {
+        const double share = second ? record.on_velocity.extra : record.on_place.extra,
+                     sign = second ? -1 : 1;
         for (int c = 0; c < 3; ++c) {
-          split(sign * record.normal[c], share, begin.value[1 + c], finish.value[1 + c]);
-          split(sign * record.slip[c], share, begin.value[4 + c], finish.value[4 + c]);
+          split(sign * (&record.on_place.x)[c], share, begin.value[1 + c], finish.value[1 + c]);
+          split(sign * (&record.on_velocity.x)[c], share, begin.value[4 + c], finish.value[4 + c]);
         }
       });
     }

@@ -87,8 +87,8 @@ class ContactSolver : public HairContacts<Scalar<R>> {
   std::size_t bytes() const override {
     return backend_.bytes() + first_.bytes() + strand_.bytes() + start_.bytes() + end_.bytes() +
            velocity_.bytes() + list_first_.bytes() + list_entry_.bytes() + cursor_.bytes() + touch_.bytes() +
-           record_.bytes() + active_.bytes() + list_.bytes() + load_.bytes() + kappa_.bytes() +
-           neighbours_.bytes() + standing_.bytes();
+           record_.bytes() + active_.bytes() + list_.bytes() + load_.bytes() + share_.bytes() +
+           elimination_.bytes() + kappa_.bytes() + neighbours_.bytes() + standing_.bytes();
   }
 
  private:
@@ -185,7 +185,8 @@ class ContactSolver : public HairContacts<Scalar<R>> {
   // Which pairs each segment has.
   void index_pairs() {
     const std::int32_t pairs = pairs_.count;
-    load_.resize(particles_), kappa_.resize(first_.size() - 1);
+    load_.resize(std::size_t{kLoads} * particles_), share_.resize(particles_),
+        elimination_.resize(particles_), kappa_.resize(first_.size() - 1);
     touch_.resize(pairs + kWidth), record_.resize(pairs + kWidth), active_.resize(pairs + kWidth);
     list_first_.resize(particles_ + 1), cursor_.resize(particles_),
         list_entry_.resize(2 * static_cast<std::size_t>(pairs) + ContactLists::kPadding);
@@ -218,10 +219,16 @@ class ContactSolver : public HairContacts<Scalar<R>> {
   }
 
   void answer(const HairContactStep<T>& step) {
-    const ContactStrands<T> work{pairs_,        {list_first_.data(), list_entry_.data()},
-                                 first_.data(), start_.data(),
-                                 end_.data(),   velocity_.data(),
-                                 load_.data(),  kappa_.data(),
+    const ContactStrands<T> work{pairs_,
+                                 {list_first_.data(), list_entry_.data()},
+                                 first_.data(),
+                                 start_.data(),
+                                 end_.data(),
+                                 velocity_.data(),
+                                 kappa_.data(),
+                                 share_.data(),
+                                 elimination_.data(),
+                                 load_.data(),
                                  step.clamped};
     backend_.parallel_for("respond to contacts", step.strands, FindResponse<T>{work}, kStrandChunk);
     backend_.parallel_for("weigh contacts", packs(),
@@ -264,7 +271,8 @@ class ContactSolver : public HairContacts<Scalar<R>> {
   Buffer<ContactRecord<T>> record_;
   Buffer<unsigned char> active_;
   Buffer<ParticleLoad> load_;
-  Buffer<double> kappa_;
+  Buffer<Elimination> elimination_;
+  Buffer<double> kappa_, share_;
 };
 
 }  // namespace RINGLET_ISA

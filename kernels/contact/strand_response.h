@@ -17,18 +17,20 @@
 // exceeds its rows' sums exceeds the matrix; without A this is mass splitting: Tonge, Benevolenski,
 // Voroshilov 2012.)
 #pragma once
+#include "kernels/backend/pack.h"
 #include "kernels/backend/words.h"
 #include "kernels/contact/contact_passes.h"
 
 namespace ringlet::kernels {
 inline namespace RINGLET_ISA {
 
-inline constexpr int kLoads = 7;
+// What contacts do to a particle, in three lanes, then what moves it: kPlace and kVelocity of each.
+using ParticleLoad = Pack<double, 4>;
+enum { kPlace, kVelocity, kLoads };
 
-// What contacts do to a particle: shares, impulses on its place and on its velocity. Then what moves it.
-struct ParticleLoad {
-  double value[kLoads];
-  double carry;  // of the elimination
+// What eliminating the particles before it leaves of a particle's row of A.
+struct Elimination {
+  double inverse, carry;
 };
 
 template <class T>
@@ -38,8 +40,10 @@ struct ContactStrands {
   const std::int32_t* first_particle;  // [strands + 1]
   const Place<T>* start;               // extra: freedom
   Place<T>*end, *velocity;
-  ParticleLoad* load;  // [particles]
-  double* kappa;       // [strands], negative where nothing touches
+  double* kappa;             // [strands], negative where nothing touches
+  double* share;             // [particles] of contacts, then how it would respond to them
+  Elimination* elimination;  // [particles]
+  ParticleLoad* load;        // [particles][kLoads]
   std::int32_t clamped;
 
   RINGLET_KERNEL std::int32_t first(std::int32_t strand) const { return first_particle[strand]; }
@@ -58,29 +62,30 @@ struct ContactStrands {
     }
   }
 
-  // d = A^-1 f in place, components [kBegin, kEnd) of the loads: Thomas algorithm.
-  template <int kBegin, int kEnd>
-  RINGLET_FUNCTION void respond(std::int32_t strand, double kappa_here) const {
+  // Thomas algorithm: A's elimination once, then d = A^-1 f in place for the values of a strand's particles.
+  RINGLET_FUNCTION void eliminate(std::int32_t strand) const {
     const std::int32_t n = particles(strand);
-    ParticleLoad* at = load + first(strand);
+    Elimination* at = elimination + first(strand);
     double carry = 0;
     for (std::int32_t i = 0; i < n; ++i) {
-      ParticleLoad& here = at[i];
-      if (i < clamped) {
-        for (int k = kBegin; k < kEnd; ++k) here.value[k] = 0;
-        here.carry = 0;
-        continue;
-      }
       const double links = (i > 0 ? 1 : 0) + (i + 1 < n ? 1 : 0);
-      const double inverse = 1 / (1 + kappa_here * (links - carry));
-      for (int k = kBegin; k < kEnd; ++k) {
-        const double before = i > 0 ? at[i - 1].value[k] : 0;
-        here.value[k] = (here.value[k] + kappa_here * before) * inverse;
-      }
-      carry = here.carry = kappa_here * inverse;
+      const double inverse = i < clamped ? 0 : 1 / (1 + kappa[strand] * (links - carry));
+      carry = kappa[strand] * inverse;
+      at[i] = {inverse, carry};
     }
-    for (std::int32_t i = n - 2; i >= clamped; --i)
-      for (int k = kBegin; k < kEnd; ++k) at[i].value[k] += at[i].carry * at[i + 1].value[k];
+  }
+  template <int kEach, class V>
+  RINGLET_FUNCTION void respond(std::int32_t strand, V* values) const {  // [particles][kEach]
+    const std::int32_t n = particles(strand);
+    const Elimination* at = elimination + first(strand);
+    V* value = values + static_cast<std::int64_t>(first(strand)) * kEach;
+    for (int k = 0; k < kEach; ++k) {
+      V before(0.0);
+      for (std::int32_t i = 0; i < n; ++i)
+        value[i * kEach + k] = before = (value[i * kEach + k] + V(kappa[strand]) * before) * V(at[i].inverse);
+      for (std::int32_t i = n - 2; i >= clamped; --i)
+        value[i * kEach + k] = before = value[i * kEach + k] + V(at[i].carry) * before;
+    }
   }
 };
 
@@ -100,22 +105,22 @@ struct FindResponse {
       carried = 0;
       if (i + 1 < n) {
         strands.for_contacts(p, strands.pairs.touch, [&](const Touch<T>& touch, bool second) {
-          const double share = summable(second ? touch.y : touch.x);
+          const double share = summable(static_cast<double>(second ? touch.y : touch.x));
           here += 1 - share, carried += share, touched = true;
           depth = -touch.z > depth ? -touch.z : depth;
         });
         length += kernels::length(vector_of(strands.start[p + 1]) - vector_of(strands.start[p]));
       }
-      strands.load[p].value[0] = here;
+      strands.share[p] = here;
     }
     strands.kappa[strand] = -1;
     if (!touched) return;
     const double reach = kReach * depth * (n - 1) / max(length, 1e-9);
-    const double kappa = reach * reach;
-    strands.kappa[strand] = kappa;
-    strands.template respond<0, 1>(strand, kappa);
+    strands.kappa[strand] = reach * reach;
+    strands.eliminate(strand);
+    strands.template respond<1>(strand, strands.share);
     for (std::int32_t i = 0, p = first; i < n; ++i, ++p)
-      strands.velocity[p].extra = static_cast<T>(strands.load[p].value[0]);
+      strands.velocity[p].extra = static_cast<T>(strands.share[p]);
   }
 };
 
@@ -126,34 +131,39 @@ struct ApplyContacts {
   RINGLET_FUNCTION void operator()(std::int32_t strand) const {
     if (strands.kappa[strand] < 0) return;
     const std::int32_t n = strands.particles(strand), first = strands.first(strand);
-    for (int k = 0; k < kLoads; ++k) strands.load[first].value[k] = 0;
-    for (std::int32_t i = 0, p = first; i + 1 < n; ++i, ++p) {
-      ParticleLoad &begin = strands.load[p], &finish = strands.load[p + 1];
-      for (int k = 0; k < kLoads; ++k) finish.value[k] = 0;
-      strands.for_contacts(p, strands.pairs.record, [&](const ContactRecord<T>& record, bool second) {
-        const double share = second ? record.on_velocity.extra : record.on_place.extra,
-                     sign = second ? -1 : 1;
-        for (int c = 0; c < 3; ++c) {
-          split(sign * (&record.on_place.x)[c], share, begin.value[1 + c], finish.value[1 + c]);
-          split(sign * (&record.on_velocity.x)[c], share, begin.value[4 + c], finish.value[4 + c]);
-        }
-      });
+    ParticleLoad begin[kLoads] = {0.0, 0.0};
+    for (std::int32_t p = first; p < first + n; ++p) {
+      ParticleLoad finish[kLoads] = {0.0, 0.0};
+      if (p + 1 < first + n)
+        strands.for_contacts(p, strands.pairs.record, [&](const ContactRecord<T>& record, bool second) {
+          const double share = second ? record.on_velocity.extra : record.on_place.extra,
+                       sign = second ? -1 : 1;
+          split(record.on_place, sign, share, begin[kPlace], finish[kPlace]);
+          split(record.on_velocity, sign, share, begin[kVelocity], finish[kVelocity]);
+        });
+      for (int k = 0; k < kLoads; ++k) strands.load[p * kLoads + k] = begin[k], begin[k] = finish[k];
     }
-    strands.template respond<1, kLoads>(strand, strands.kappa[strand]);
-    for (std::int32_t i = strands.clamped, p = first + i; i < n; ++i, ++p) {
-      move(strands.end[p], strands.load[p].value + 1), move(strands.velocity[p], strands.load[p].value + 4);
+    strands.template respond<kLoads>(strand, strands.load);
+    for (std::int32_t p = first + strands.clamped; p < first + n; ++p) {
+      move(strands.end[p], strands.load[p * kLoads + kPlace]);
+      move(strands.velocity[p], strands.load[p * kLoads + kVelocity]);
     }
   }
 
  private:
   // Both parts together are what the other segment has, but for the sign.
-  RINGLET_KERNEL static void split(double impulse, double share, double& begin, double& finish) {
-    const double part = summable(share * impulse);
-    finish += part, begin += summable(impulse) - part;
+  RINGLET_KERNEL static void split(const Place<T>& impulse, double sign, double share, ParticleLoad& begin,
+                                   ParticleLoad& finish) {
+    const ParticleLoad whole = ParticleLoad(sign) * in_double(impulse),
+                       part = summable(ParticleLoad(share) * whole);
+    finish = finish + part, begin = begin + (summable(whole) - part);
   }
-  RINGLET_KERNEL static void move(Place<T>& place, const double* by) {
-    place.x = static_cast<T>(place.x + by[0]), place.y = static_cast<T>(place.y + by[1]),
-    place.z = static_cast<T>(place.z + by[2]);
+  RINGLET_KERNEL static ParticleLoad in_double(const Place<T>& place) {
+    return __builtin_convertvector(Pack<T, 4>::load(&place.x).v, ParticleLoad::Vector);
+  }
+  RINGLET_KERNEL static void move(Place<T>& place, const ParticleLoad& by) {
+    place.x = static_cast<T>(place.x + by.v[0]), place.y = static_cast<T>(place.y + by.v[1]),
+    place.z = static_cast<T>(place.z + by.v[2]);
   }
 };
 

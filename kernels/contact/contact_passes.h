@@ -10,9 +10,11 @@
 namespace ringlet::kernels {
 inline namespace RINGLET_ISA {
 
-// Where a pair touches: s, u and the gap in x, y and z.
+// Where a pair touches, and how far apart it is there.
 template <class T>
-using Touch = Place<T>;
+struct alignas(4 * sizeof(T)) Touch {
+  T s, u, gap, none;
+};
 
 // What a contact does: vectors in x, y and z; s, then u.
 template <class T>
@@ -27,7 +29,7 @@ struct ContactPairs {
   const signed char* side;    // [pairs] see find_contact
   Touch<T>* touch;            // [pairs]
   ContactRecord<T>* record;   // [pairs]
-  unsigned char* active;      // [pairs] 0: no contact, 2: of segments that have crossed
+  unsigned char* active;      // [pairs] 0: no contact, 1: a contact, 2: of segments that have crossed
   std::int32_t count;
 };
 
@@ -77,7 +79,7 @@ struct FindContacts {
     const Vector3<R> before = pair.a_start.at(contact.s) - pair.b_start.at(contact.u),
                      after = pair.a.at(contact.s) - pair.b.at(contact.u);
     const Vector3<R> slip = contact.later * across(contact.normal, after - before), normal = contact.normal;
-    store_quads<R>(&pairs.touch[first].x, 1, {contact.s, contact.u, gap, R(0)});
+    store_quads<R>(&pairs.touch[first].s, 1, {contact.s, contact.u, gap, R(0)});
     store_quads<R>(&pairs.record[first].on_place.x, 2, {normal.x, normal.y, normal.z, contact.s});
     store_quads<R>(&pairs.record[first].on_velocity.x, 2, {slip.x, slip.y, slip.z, contact.u});
   }
@@ -103,7 +105,7 @@ struct WeighContacts {
     if (!any_active) return;
     T *on_place = &pairs.record[first].on_place.x, *on_velocity = &pairs.record[first].on_velocity.x;
     const Quad<R> place = load_quads<R>(on_place, 2), way = load_quads<R>(on_velocity, 2);
-    const R s = place.w, u = way.w, gap = load_quads<R>(&pairs.touch[first].x, 1).z;
+    const R s = place.w, u = way.w, gap = load_quads<R>(&pairs.touch[first].s, 1).z;
     const Vector3<R> normal = vector_of(place), slip = vector_of(way);
     const GatheredSegment<R> a = gather_segment<R>(velocity, pairs.a + first),
                              b = gather_segment<R>(velocity, pairs.b + first);

@@ -63,9 +63,9 @@ class ContactSolver : public HairContacts<Scalar<R>> {
     const Touch<T>* touch = touch_.data();
     figures.crossings = static_cast<std::int64_t>(backend_.sum(
         "count crossings", pairs_.count,
-        [=] RINGLET_LAMBDA(std::int32_t k) { return active[k] == 2 && touch[k].z < T(0) ? 1.0 : 0.0; }));
+        [=] RINGLET_LAMBDA(std::int32_t k) { return active[k] == 2 && touch[k].gap < T(0) ? 1.0 : 0.0; }));
     figures.depth = backend_.largest("depth", pairs_.count, 0, [=] RINGLET_LAMBDA(std::int32_t k) {
-      return active[k] == 1 ? -static_cast<double>(touch[k].z) : 0.0;
+      return active[k] == 1 ? -static_cast<double>(touch[k].gap) : 0.0;
     });
   }
 

@@ -121,7 +121,7 @@ class StandingCrossings {
     for (std::int32_t k = 0; k < count_; ++k) keys[k] = key_.data()[k];
   }
   void copy_from(const std::uint64_t* keys, std::int32_t count) {
-    key_.resize(count), order_.resize(count);
+    if (static_cast<std::size_t>(count) > key_.size()) key_.resize(count), order_.resize(count);
     for (std::int32_t k = 0; k < count; ++k) key_.data()[k] = keys[k];
     count_ = count;
   }

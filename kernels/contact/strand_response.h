@@ -65,27 +65,31 @@ struct ContactStrands {
   // Thomas algorithm: A's elimination once, then d = A^-1 f in place for the values of a strand's particles.
   RINGLET_FUNCTION void eliminate(std::int32_t strand) const {
     const std::int32_t n = particles(strand);
+    const double kappa_here = kappa[strand];
     Elimination* at = elimination + first(strand);
     double carry = 0;
-    for (std::int32_t i = 0; i < n; ++i) {
+    for (std::int32_t i = clamped; i < n; ++i) {
       const double links = (i > 0 ? 1 : 0) + (i + 1 < n ? 1 : 0);
-      const double inverse = i < clamped ? 0 : 1 / (1 + kappa[strand] * (links - carry));
-      carry = kappa[strand] * inverse;
+      const double inverse = 1 / (1 + kappa_here * (links - carry));
+      carry = kappa_here * inverse;
       at[i] = {inverse, carry};
     }
   }
+  // Of particles that are not prescribed, [particles][kEach].
   template <int kEach, class V>
-  RINGLET_FUNCTION void respond(std::int32_t strand, V* values) const {  // [particles][kEach]
+  RINGLET_FUNCTION void respond(std::int32_t strand, V* values) const {
     const std::int32_t n = particles(strand);
+    const V kappa_here(kappa[strand]);
     const Elimination* at = elimination + first(strand);
     V* value = values + static_cast<std::int64_t>(first(strand)) * kEach;
-    for (int k = 0; k < kEach; ++k) {
-      V before(0.0);
-      for (std::int32_t i = 0; i < n; ++i)
-        value[i * kEach + k] = before = (value[i * kEach + k] + V(kappa[strand]) * before) * V(at[i].inverse);
-      for (std::int32_t i = n - 2; i >= clamped; --i)
-        value[i * kEach + k] = before = value[i * kEach + k] + V(at[i].carry) * before;
-    }
+    V before[kEach];
+    for (V& none : before) none = V(0.0);
+    for (std::int32_t i = clamped; i < n; ++i)
+      for (int k = 0; k < kEach; ++k)
+        value[i * kEach + k] = before[k] = (value[i * kEach + k] + kappa_here * before[k]) * V(at[i].inverse);
+    for (std::int32_t i = n - 2; i >= clamped; --i)
+      for (int k = 0; k < kEach; ++k)
+        value[i * kEach + k] = before[k] = value[i * kEach + k] + V(at[i].carry) * before[k];
   }
 };
 
@@ -105,9 +109,9 @@ struct FindResponse {
       carried = 0;
       if (i + 1 < n) {
         strands.for_contacts(p, strands.pairs.touch, [&](const Touch<T>& touch, bool second) {
-          const double share = summable(static_cast<double>(second ? touch.y : touch.x));
+          const double share = summable(static_cast<double>(second ? touch.u : touch.s));
           here += 1 - share, carried += share, touched = true;
-          depth = -touch.z > depth ? -touch.z : depth;
+          depth = -touch.gap > depth ? -touch.gap : depth;
         });
         length += kernels::length(vector_of(strands.start[p + 1]) - vector_of(strands.start[p]));
       }
@@ -119,7 +123,7 @@ struct FindResponse {
     strands.kappa[strand] = reach * reach;
     strands.eliminate(strand);
     strands.template respond<1>(strand, strands.share);
-    for (std::int32_t i = 0, p = first; i < n; ++i, ++p)
+    for (std::int32_t p = first + strands.clamped; p < first + n; ++p)
       strands.velocity[p].extra = static_cast<T>(strands.share[p]);
   }
 };

@@ -310,15 +310,15 @@ class GridSolver final : public HairGrid<T> {
           for (int v = 0; v < kTileCells * kNodeValues; ++v) sums[v] = 0;
         },
         kTileChunk);
-    // Tiles in blocks of up to eight, whose nodes stay in the cache. A block's colour is its key's lowest
-    // bits: no two of a colour are neighbours.
-    for (std::uint64_t colour = 0; colour < 8; ++colour)
+    for (int colour = 0; colour < kColours; ++colour)
       backend_.parallel_for(
           "grid: scatter", data_.occupied,
           [g = data_, colour] RINGLET_LAMBDA(int t) {
-            const auto block = [&](int at) { return g.tile_key[g.occupied_tile[at]] >> 3; };
+            const auto block = [&](int at) {
+              return block_of(g.tile_key[g.occupied_tile[at]], Backend::kTilesTogether);
+            };
             const std::uint64_t own = block(t);
-            if ((own & 7) != colour || (t > 0 && block(t - 1) == own)) return;
+            if (colour_of(own) != colour || (t > 0 && block(t - 1) == own)) return;
             for (int at = t; at < g.occupied && block(at) == own; ++at) scatter_tile(g, at);
           },
           2 * kTileChunk);

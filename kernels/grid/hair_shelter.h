@@ -29,25 +29,30 @@ RINGLET_FUNCTION T mean_density(const GridData<T>& g, std::int32_t tile) {
   return sum / T(kTileCells);
 }
 
-// From a tile's middle upwind, through each tile for as long as the way lies in it, until there can be none
-// any more.
+// From a tile's middle upwind, through each tile for as long as the way lies in it; as far as the hair goes,
+// but for hair thousands of tiles away.
 template <class T>
 RINGLET_FUNCTION T depth_before(const GridData<T>& g, const TileShelter<T>& shelter, std::int32_t tile) {
-  std::int32_t corner[3], at[3];
+  constexpr int kMostTiles = 1 << 11, kStride[3] = {1, 3, 9};
+  if (!(shelter.per_tile > 0)) return T(0);
+  std::int32_t corner[3], at[3], step[3];
   double next[3], each[3];  // how far it is to the side of the next tile along each axis, and between them
   tile_corner(g, tile, corner);
   for (int c = 0; c < 3; ++c) {
-    const double along = shelter.upwind[c] < 0 ? -shelter.upwind[c] : shelter.upwind[c];
+    step[c] = shelter.upwind[c] < 0 ? -1 : 1;
+    const double along = step[c] * shelter.upwind[c];
     at[c] = corner[c] / kTileEdge, each[c] = along > 1e-9 ? 1 / along : 1e9, next[c] = 0.5 * each[c];
   }
-  constexpr int kMostTiles = 1 << 11;
   double sum = 0, gone = 0;
-  for (int k = 0; k < kMostTiles && shelter.per_tile > 0; ++k) {
+  std::int32_t here = tile;
+  for (int k = 0; k < kMostTiles; ++k) {
     const int axis = next[0] <= next[1] && next[0] <= next[2] ? 0 : next[1] <= next[2] ? 1 : 2;
-    const std::int32_t here = find_key(g.tile_key, g.tiles, key_of(at[0], at[1], at[2]));
     if (here >= 0) sum += (next[axis] - gone) * static_cast<double>(shelter.tile_density[here]);
-    gone = next[axis], next[axis] += each[axis], at[axis] += shelter.upwind[axis] < 0 ? -1 : 1;
+    gone = next[axis], next[axis] += each[axis], at[axis] += step[axis];
     if (at[axis] < 0 || at[axis] >= g.extent[axis]) break;
+    here = here >= 0
+               ? g.near[static_cast<std::int64_t>(here) * kAround + kAround / 2 + step[axis] * kStride[axis]]
+               : find_key(g.tile_key, g.tiles, key_of(at[0], at[1], at[2]));
   }
   return static_cast<T>(shelter.per_tile * sum);
 }

@@ -29,6 +29,12 @@ RINGLET_FUNCTION std::uint64_t key_before(std::uint64_t key, int axis) {
   return (((key & mask) - (std::uint64_t{1} << axis)) & mask) | (key & ~mask);
 }
 
+// Tiles are scattered in blocks of up to 2^together (0 or 3), colour by colour: there is a tile between any
+// two blocks of a colour.
+RINGLET_KERNEL std::uint64_t block_of(std::uint64_t tile_key, int together) { return tile_key >> together; }
+RINGLET_KERNEL int colour_of(std::uint64_t block) { return static_cast<int>(block & 7); }
+inline constexpr int kColours = 8;
+
 // The number of a cell within its tile, from its coordinates' lowest two bits.
 RINGLET_KERNEL int cell_in_tile(int x, int y, int z) {
   const auto spread = [](int a) { return (a & 1) | (a & 2) << 2; };

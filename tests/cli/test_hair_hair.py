@@ -208,7 +208,7 @@ def test_hair_shelters_hair_from_the_wind(program, scene, tmp_path):
     unsheltered = blown("none", {})
     assert frame_bytes(blown("zero", {"shelter": {"strength": 0}})) == frame_bytes(unsheltered)
     moved = [np.abs(positions(unsheltered) - still).mean()]
-    for strength in (1, 10, 1000):
+    for strength in (10, 100, 1000):  # at 1 so thin a groom lets all but a few thousandths through
         moved.append(np.abs(positions(blown(str(strength), {"shelter": {"strength": strength}})) - still).mean())
     assert moved == sorted(moved, reverse=True) and moved[-1] < 0.7 * moved[0], moved
 

@@ -51,6 +51,7 @@ inline double tetrahedron_volume(const SegmentEnds& e) {
 
 struct SegmentCrossings {
   int count = 0;
+  int sides = 0;      // from below, where the volume is negative, less those from above
   double last = 0;    // share of the motion, of the last
   bool clear = true;  // no end was so near that it decides
 };
@@ -66,7 +67,7 @@ inline SegmentCrossings segment_crossings(const SegmentMotion& motion, int steps
       const Eigen::Vector2d at = closest_on_lines(e);
       const double inside = std::min(at.minCoeff(), 1 - at.maxCoeff());
       if (std::abs(inside) < 0.02) found.clear = false;
-      if (inside > 0) ++found.count, found.last = (k - 0.5) / steps;
+      if (inside > 0) ++found.count, found.sides += before < 0 ? 1 : -1, found.last = (k - 0.5) / steps;
     }
     before = now;
   }

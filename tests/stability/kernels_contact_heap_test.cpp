@@ -87,10 +87,7 @@ class Passages {
             return {at[one][i], at[one][i + 1], at[other][j], at[other][j + 1]};
           };
           const oracle::SegmentMotion motion{ends(points_), ends(now)};
-          const auto below = [](const oracle::SegmentEnds& e) { return oracle::tetrahedron_volume(e) < 0; };
-          if (below(motion.start) != below(motion.end) &&
-              oracle::segment_crossings(motion, 200).count % 2 == 1)
-            sides_[k] += below(motion.start) ? 1 : -1;
+          if (may_cross(motion)) sides_[k] += oracle::segment_crossings(motion, 200).sides;
         }
     });
     points_ = now;
@@ -105,6 +102,15 @@ class Passages {
     for (std::size_t s = 0; s < run.strands(); ++s)
       for (int i = 0; i < run.count(s); ++i) points[s].push_back(run.position(s, i));
     return points;
+  }
+
+  // Not where the volume has one sign throughout: it is a cubic in time, within its Bernstein coefficients.
+  static bool may_cross(const oracle::SegmentMotion& motion) {
+    const auto volume = [&](double share) { return oracle::tetrahedron_volume(motion.after(share)); };
+    const double first = volume(0), third = volume(1.0 / 3), two_thirds = volume(2.0 / 3), last = volume(1);
+    const double one = (-5 * first + 18 * third - 9 * two_thirds + 2 * last) / 6,
+                 two = (2 * first - 9 * third + 18 * two_thirds - 5 * last) / 6;
+    return std::min({first, one, two, last}) <= 0 && std::max({first, one, two, last}) >= 0;
   }
 
   const HairRun<float>& run_;

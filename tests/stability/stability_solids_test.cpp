@@ -4,8 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
-#include <numbers>
 
 #include "stability/suite.h"
 
@@ -104,25 +102,6 @@ INSTANTIATE_TEST_SUITE_P(SolidsInDouble, Stability,
                          testing::ValuesIn(everywhere(kBoxOnTips, kStrandModels, {Machine::kDouble})),
                          case_name);
 INSTANTIATE_TEST_SUITE_P(Solids, Stability, testing::ValuesIn(everywhere(kSolids)), case_name);
-
-// Hair from a ring towards its middle that falls on a floor 3 cm below, and on hair. Mass springs that lie on
-// a floor against their rest shape tremble, with contacts or without.
-Scenario heap() {
-  Scenario scenario = among("heap_on_a_floor", solids({solid("floor", {{0, Vec3(0, -0.05, 0)}})}),
-                            {{"floor", Vec3(0.3, 0.02, 0.3)}}, 0, 0, false);
-  scenario.set.emplace_back(
-      "/effects/hair_hair={\"contacts\": {\"radius\": 2e-4, \"cadence\": \"substep\"}}");
-  scenario.hair.clear();
-  constexpr int kHairs = 12;
-  for (int s = 0; s < kHairs; ++s) {
-    const double turn = 2 * std::numbers::pi * s / kHairs;
-    const Vec3 out(std::cos(turn), 0, std::sin(turn));
-    scenario.hair.push_back(straight(0.1 * out + Vec3(0, 0.002 * s, 0), -out));
-  }
-  return scenario;
-}
-INSTANTIATE_TEST_SUITE_P(HeapOnAFloor, Stability, testing::ValuesIn(everywhere({heap()}, {Model::kAms})),
-                         case_name);
 
 // Hair that is kept in its head by its rest shape, and pushed out by the head: pressed onto edges, where it
 // never quite comes to rest. It is no faster than it moves, by the difference of two runs of which one is a

@@ -238,9 +238,9 @@ TYPED_TEST(ContactResponse, AStrandFarAwayChangesNothingHere) {
   EXPECT_NEAR(contacts_with({broken}), alone, 0.01 * alone);
 }
 
-// Of more pairs than contacts may look at, those that matter most are taken, and the rest does no harm.
+// Of more pairs than contacts may look at some are left out: what the others do is a contact's doing still.
 TYPED_TEST(ContactResponse, ABundleOfMorePairsThanThereIsRoomForKeepsItsMomentum) {
-  constexpr int kStrands = 600, kMostPairs = 1 << 18;  // some 900,000 pairs of segments lie within reach
+  constexpr int kStrands = 600, kMost = 1 << 18;  // some 900,000 pairs of segments lie within reach
   auto strands = this->tangle(kStrands);
   for (HairStrand& strand : strands)
     for (int i = 0; i < 6; ++i)
@@ -250,8 +250,8 @@ TYPED_TEST(ContactResponse, ABundleOfMorePairsThanThereIsRoomForKeepsItsMomentum
   const auto before = this->sums_of(run);
   const HairContactFigures found = this->one_pass(run);
   const auto after = this->sums_of(run);
-  EXPECT_LE(found.pairs, kMostPairs);
-  EXPECT_GT(found.pairs, kMostPairs / 2);
+  EXPECT_LE(found.pairs, kMost);
+  EXPECT_GT(found.pairs, kMost / 2);
   EXPECT_NEAR((after.momentum - before.momentum).norm(), 0, this->either(1e-11, 1e-4));
   EXPECT_LT(after.energy, 0.95 * before.energy);
 }

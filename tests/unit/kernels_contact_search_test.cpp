@@ -230,5 +230,29 @@ TYPED_TEST(ContactSearch, FindsEachPairOnceAndKeepsWhatMattersMost) {
   EXPECT_EQ(most, kernels::kMostPairs) << "some have more pairs than are kept";
 }
 
+// Pairs that become a little more each time are looked for once each time, but for a few.
+TEST(PairMemory, GrowsAheadOfWhatItHolds) {
+  constexpr int kTimes = 30, kGroups = 40;
+  kernels::Host host(kernels::HostThreads{run_with_tbb, nullptr});
+  kernels::PairMemory<kernels::Host> memory;
+  int searches = 0, pairs = 600;  // of each group
+  for (int time = 0; time < kTimes; ++time, pairs += pairs / 20) {
+    memory.fill(host, kGroups, [&](const kernels::PairPool& pool) {
+      ++searches;
+      for (int group = 0; group < kGroups; ++group) {
+        kernels::PairWriter writer{pool};
+        for (int k = 0; k < pairs; ++k) writer.add({group, k, 0});
+        pool.last[group] = writer.block, pool.count[group] = writer.count;
+      }
+    });
+    const kernels::PairPool pool = memory.pool();
+    std::vector<int> found(pairs);
+    for (int group = 0; group < kGroups; ++group)
+      pool.for_pairs(group, [&](const kernels::RankedPair& pair) { found[pair.b] += pair.a == group; });
+    ASSERT_EQ(found, std::vector<int>(pairs, kGroups)) << "at time " << time;
+  }
+  EXPECT_LE(searches, kTimes + 6);
+}
+
 }  // namespace
 }  // namespace ringlet::kernels_testing

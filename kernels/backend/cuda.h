@@ -38,8 +38,8 @@ class Cuda {
  public:
   template <class T>
   using Buffer = CudaBuffer<T>;
-  using Lent = CudaStream*;                 // outlives this
-  static constexpr int kTilesTogether = 0;  // a thread has one to itself
+  using Lent = CudaStream*;                          // outlives this
+  static constexpr bool kCallsShareThreads = false;  // a thread for each
 
   explicit Cuda(CudaStream* stream) : stream_(stream) {}
 

@@ -69,7 +69,7 @@ class Host {
   using Buffer = HostBuffer<T>;
   using Lent = HostThreads;
   static constexpr int kChunk = 2048;
-  static constexpr int kTilesTogether = 3;  // of the grid, as block_of has it: their nodes stay in the cache
+  static constexpr bool kCallsShareThreads = true;  // what one call has read the next finds in the cache
 
   explicit Host(HostThreads threads) : threads_(threads) {}
 

@@ -102,9 +102,10 @@ RINGLET_KERNEL T thickest(const Place<T>* end, std::int32_t segment) {
 
 // Rounded so that sums are exact, and so the same in any order: to multiples of 2^-36, which leaves room for
 // a sum of 2^16.
-template <class V>
-RINGLET_KERNEL V summable(const V& a) {
-  const V shift(1.5 * 65536.0);  // 1.5 * 2^(52 - 36)
+template <class R>
+RINGLET_KERNEL R summable(const R& a) {
+  static_assert(sizeof(Scalar<R>) == sizeof(double));
+  const R shift(1.5 * 65536.0);  // 1.5 * 2^(52 - 36)
   return (a + shift) - shift;
 }
 

@@ -310,13 +310,12 @@ class GridSolver final : public HairGrid<T> {
           for (int v = 0; v < kTileCells * kNodeValues; ++v) sums[v] = 0;
         },
         kTileChunk);
+    constexpr int kTogether = Backend::kCallsShareThreads ? 3 : 0;
     for (int colour = 0; colour < kColours; ++colour)
       backend_.parallel_for(
           "grid: scatter", data_.occupied,
           [g = data_, colour] RINGLET_LAMBDA(int t) {
-            const auto block = [&](int at) {
-              return block_of(g.tile_key[g.occupied_tile[at]], Backend::kTilesTogether);
-            };
+            const auto block = [&](int at) { return block_of(g.tile_key[g.occupied_tile[at]], kTogether); };
             const std::uint64_t own = block(t);
             if (colour_of(own) != colour || (t > 0 && block(t - 1) == own)) return;
             for (int at = t; at < g.occupied && block(at) == own; ++at) scatter_tile(g, at);

@@ -207,10 +207,14 @@ def test_hair_shelters_hair_from_the_wind(program, scene, tmp_path):
     still = positions(finish(program, scene, tmp_path / "still", *hair_hair(GRID)))
     unsheltered = blown("none", {})
     assert frame_bytes(blown("zero", {"shelter": {"strength": 0}})) == frame_bytes(unsheltered)
-    moved = [np.abs(positions(unsheltered) - still).mean()]
-    for strength in (10, 100, 1000):  # at 1 so thin a groom lets all but a few thousandths through
-        moved.append(np.abs(positions(blown(str(strength), {"shelter": {"strength": strength}})) - still).mean())
-    assert moved == sorted(moved, reverse=True) and moved[-1] < 0.7 * moved[0], moved
+    moved, parted = [np.abs(positions(unsheltered) - still).mean()], [0]
+    for strength in (1, 10, 100, 1000):
+        sheltered = positions(blown(str(strength), {"shelter": {"strength": strength}}))
+        moved.append(np.abs(sheltered - still).mean()), parted.append(np.abs(sheltered - positions(unsheltered)).mean())
+    assert parted == sorted(set(parted)), parted
+    # At 1 the wind is 4 % weaker, and how far hair swings out in it no more than 0.03 % different, either way.
+    assert moved[1] == pytest.approx(moved[0], rel=1e-3), moved
+    assert moved[1:] == sorted(moved[1:], reverse=True) and moved[-1] < 0.7 * moved[0], moved
 
 
 def densest(points, cell):

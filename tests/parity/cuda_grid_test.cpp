@@ -43,7 +43,7 @@ class Threads {
   template <class T>
   using Buffer = UnclearedBuffer<T>;
   struct Lent {};
-  static constexpr int kTilesTogether = 0;
+  static constexpr bool kCallsShareThreads = false;
 
   explicit Threads(Lent) {}
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "kernels/launch/hair_contacts.h"
+#include "kernels/solid/touch.h"
 #include "state/strand_order.h"
 
 namespace ringlet::kernels_testing {
@@ -83,6 +84,7 @@ class HairRun {
     step.state = state.view(), step.radius = radius_.data();
     step.start = start_.data(), step.start_root_points = start_roots_.data();
     step.root_points = state.root_points.data();
+    step.step = T(kStep), step.touches = state.touches.empty() ? nullptr : state.touches.data();
     return step;
   }
 
@@ -142,6 +144,16 @@ class HairRun {
   }
   void set_velocity(std::size_t strand, int i, const Vec3& v) {
     for (int c = 0; c < 3; ++c) state.velocity[model.layout.at(strand, i, 3, c)] = T(v[c]);
+  }
+  // A solid has pressed the particle.
+  void hold(std::size_t strand, int i, const Vec3& normal, const Vec3& surface_velocity, double friction) {
+    using kernels::kTouchReals;
+    if (state.touches.empty()) state.touches.assign(model.layout.rows() * kTouchReals * kLanes, T(0));
+    for (int c = 0; c < 3; ++c) {
+      state.touches[model.layout.at(strand, i, kTouchReals, c)] = T(normal[c]);
+      state.touches[model.layout.at(strand, i, kTouchReals, 3 + c)] = T(surface_velocity[c]);
+    }
+    state.touches[model.layout.at(strand, i, kTouchReals, 6)] = T(friction);
   }
   void set_radius(std::size_t strand, double radius) {
     for (int i = 0; i < count(strand); ++i) radius_[model.layout.at(strand, i, 1, 0)] = T(radius);

@@ -224,6 +224,7 @@ class StrandRun {
     step.figures = contact_figures.data();
     step.strain_limit = parameters.strain_limit, step.speed_limit = parameters.speed_limit;
     step.skipped_substeps = parameters.skipped_substeps;
+    step.touches = state.touches.empty() ? nullptr : state.touches.data();
     for (int begin = 0; begin < batches; begin += piece)
       Machine::kernels().contact_step(step, begin, std::min(begin + piece, batches), scratch.data());
   }

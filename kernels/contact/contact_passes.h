@@ -6,6 +6,7 @@
 #pragma once
 #include "kernels/backend/words.h"
 #include "kernels/contact/contact_response.h"
+#include "kernels/contact/held_particles.h"
 
 namespace ringlet::kernels {
 inline namespace RINGLET_ISA {
@@ -89,6 +90,10 @@ struct FindContacts {
 // is safe. Velocities are not, for they would bounce.
 inline constexpr double kRelaxation = 1.5;
 
+// Hair that solids press together from both sides, and that gives way by less than this share of what it
+// would do freely, is left to them.
+inline constexpr double kSqueezed = 0.1;
+
 // Impulses of a pack of pairs, in the place of what they are made of.
 template <class R>
 struct WeighContacts {
@@ -96,6 +101,7 @@ struct WeighContacts {
   static constexpr int kWidth = Traits<R>::kWidth;
   ContactPairs<T> pairs;
   const Place<T>* velocity;  // extra: how the particle responds to all contacts of its strand
+  const Place<T>* plane;     // of particles that solids hold (HeldParticle); null: none do
   T friction;
 
   RINGLET_FUNCTION void operator()(std::int32_t pack) const {
@@ -109,12 +115,18 @@ struct WeighContacts {
     const Vector3<R> normal = vector_of(place), slip = vector_of(way);
     const GatheredSegment<R> a = gather_segment<R>(velocity, pairs.a + first),
                              b = gather_segment<R>(velocity, pairs.b + first);
-    const R per_mass = inverse_or_zero(a.extra_at(s) + b.extra_at(u), R(T(1e-6)));
+    const R free = a.extra_at(s) + b.extra_at(u), across_mass = inverse_or_zero(free, R(T(1e-6)));
+    ContactMass<R> mass{across_mass, across_mass};
+    if (plane) {
+      const R held = held_response(plane, pairs.a + first, s, a, normal) +
+                     held_response(plane, pairs.b + first, u, b, R(T(-1)) * normal);
+      mass.along = select(held < R(T(kSqueezed)) * free, R(0), inverse_or_zero(held, R(T(1e-6))));
+    }
     const Vector3<R> speed = a.places.at(s) - b.places.at(u);
     const R mu(friction);
-    const Vector3<R> moves = contact_impulse(normal, -gap, R(T(kRelaxation)), slip, mu, per_mass),
-                     turns = contact_impulse(normal, -dot(normal, speed), R(1), across(normal, speed), mu,
-                                             per_mass);
+    const Vector3<R> moves = contact_impulse(normal, -gap, R(T(kRelaxation)), slip, mu, mass),
+                     turns =
+                         contact_impulse(normal, -dot(normal, speed), R(1), across(normal, speed), mu, mass);
     store_quads<R>(on_place, 2, {moves.x, moves.y, moves.z, s});
     store_quads<R>(on_velocity, 2, {turns.x, turns.y, turns.z, u});
   }

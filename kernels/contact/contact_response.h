@@ -22,14 +22,20 @@
 namespace ringlet::kernels {
 inline namespace RINGLET_ISA {
 
+// The mass that two places have together along their normal, and across it.
+template <class R>
+struct ContactMass {
+  R along, across;
+};
+
 // An impulse that makes up for `lacking` (distance or speed along the normal), `relaxation` times, and for
 // `slip` (across the normal) as far as friction goes. [m] or [m/s]
 template <class R>
 RINGLET_KERNEL Vector3<R> contact_impulse(Vector3<R> normal, R lacking, R relaxation, Vector3<R> slip,
-                                          R friction, R per_mass) {
-  const R along = max(lacking, R(0)) * per_mass;
+                                          R friction, const ContactMass<R>& mass) {
+  const R along = max(lacking, R(0)) * mass.along;
   const R size = length(slip);
-  const R against = min(friction * along, size * per_mass);
+  const R against = min(friction * along, size * mass.across);
   const R scale = against * inverse_or_zero(size, R(Scalar<R>(1e-18)));
   return fma(R(0) - scale, slip, relaxation * along * normal);
 }

@@ -4,7 +4,8 @@
 // application, or are nearer than the sum of their radii (segment_pair.h); each pass finds contacts anew
 // among the pairs of neighbours and answers them (contact_response.h). What is through one another when an
 // application ends is answered in the next (standing_crossings.h). Segments of one strand do not collide with
-// one another. Prescribed particles are not moved: segments at the root are obstacles.
+// one another. Prescribed particles are not moved: segments at the root are obstacles. What lies on a solid
+// is seen as the solid will leave it (held_particles.h).
 #pragma once
 #include "kernels/contact/neighbours.h"
 #include "kernels/contact/standing_crossings.h"
@@ -26,7 +27,7 @@ class ContactSolver : public HairContacts<Scalar<R>> {
     settled_ = true;
     standing_.clear();
     if (pairs_.count == 0) return;
-    lay_out_end(step);
+    lay_out_end(step, As::kTheyAre);
     standing_.find(backend_, pairs_, places());
     pairs_.count = 0;
   }
@@ -36,6 +37,7 @@ class ContactSolver : public HairContacts<Scalar<R>> {
     HairContactFigures figures;
     pairs_.count = 0;
     number_particles(step);
+    find_held(step);
     lay_out_start(step), lay_out_end(step);
     const std::int32_t found = neighbours_.find(backend_, places());
     pairs_.count = list_.make(backend_, neighbours_.a(), neighbours_.b(), found, standing_.keys(),
@@ -86,9 +88,9 @@ class ContactSolver : public HairContacts<Scalar<R>> {
 
   std::size_t bytes() const override {
     return backend_.bytes() + first_.bytes() + strand_.bytes() + start_.bytes() + end_.bytes() +
-           velocity_.bytes() + list_first_.bytes() + list_entry_.bytes() + cursor_.bytes() + touch_.bytes() +
-           record_.bytes() + active_.bytes() + list_.bytes() + load_.bytes() + share_.bytes() +
-           elimination_.bytes() + kappa_.bytes() + neighbours_.bytes() + standing_.bytes();
+           velocity_.bytes() + plane_.bytes() + list_first_.bytes() + list_entry_.bytes() + cursor_.bytes() +
+           touch_.bytes() + record_.bytes() + active_.bytes() + list_.bytes() + load_.bytes() +
+           share_.bytes() + elimination_.bytes() + kappa_.bytes() + neighbours_.bytes() + standing_.bytes();
   }
 
  private:
@@ -161,10 +163,42 @@ class ContactSolver : public HairContacts<Scalar<R>> {
         kStrandChunk);
   }
 
-  // Places and velocities as the state now has them.
-  void lay_out_end(const HairContactStep<T>& step) {
+  // What a particle moves as: `row` of the step's arrays of three components.
+  RINGLET_KERNEL static Motion<T> motion_of(const HairContactStep<T>& step, Vector3<T> root,
+                                            std::int64_t row) {
+    return {root + value_at(step.state.position + row), value_at(step.state.velocity + row)};
+  }
+  RINGLET_KERNEL static HeldParticle<T> held_particle(const HairContactStep<T>& step, std::int64_t row,
+                                                      const Place<T>& plane) {
+    const std::int64_t lane = row % kLanes;
+    const T* touch = step.touches + (row - lane) / 3 * kTouchReals + lane;
+    return {{value_at(touch), value_at(touch + 3 * kLanes), touch[6 * kLanes]}, plane, step.step};
+  }
+
+  // What solids hold, as the state now has it.
+  void find_held(const HairContactStep<T>& step) {
+    if (!step.touches) return;
+    plane_.resize(particles_);
+    Place<T>* plane = plane_.data();
+    const std::int32_t* first = first_.data();
+    backend_.parallel_for(
+        "find held", step.strands,
+        [=] RINGLET_LAMBDA(std::int32_t s) {
+          const StrandRows rows(step, s);
+          const Vector3<T> root = root_of(step, rows, step.root_points);
+          std::int64_t at = rows.values;
+          for (std::int32_t p = first[s]; p < first[s + 1]; ++p, at += 3 * kLanes)
+            plane[p] = held_particle(step, at, {}).plane_of(motion_of(step, root, at));
+        },
+        kStrandChunk);
+  }
+
+  // Places and velocities as the state now has them, or as the solids will leave it.
+  enum class As { kTheyAre, kHeld };
+  void lay_out_end(const HairContactStep<T>& step, As as = As::kHeld) {
     end_.resize(particles_), velocity_.resize(particles_);
     Place<T>*end = end_.data(), *velocity = velocity_.data();
+    const Place<T>* plane = as == As::kHeld && step.touches ? plane_.data() : nullptr;
     const std::int32_t* first = first_.data();
     backend_.parallel_for(
         "lay out end", step.strands,
@@ -173,10 +207,10 @@ class ContactSolver : public HairContacts<Scalar<R>> {
           const Vector3<T> root = root_of(step, rows, step.root_points);
           std::int64_t at = rows.values, scalar = rows.scalars;
           for (std::int32_t p = first[s]; p < first[s + 1]; ++p, at += 3 * kLanes, scalar += kLanes) {
-            const Vector3<T> now = root + value_at(step.state.position + at),
-                             v = value_at(step.state.velocity + at);
-            end[p] = {now.x, now.y, now.z, step.radius[scalar]};
-            velocity[p] = {v.x, v.y, v.z, T(0)};
+            Motion<T> now = motion_of(step, root, at);
+            if (plane) now = held_particle(step, at, plane[p]).seen(now);
+            end[p] = {now.place.x, now.place.y, now.place.z, step.radius[scalar]};
+            velocity[p] = {now.velocity.x, now.velocity.y, now.velocity.z, T(0)};
           }
         },
         kStrandChunk);
@@ -231,14 +265,17 @@ class ContactSolver : public HairContacts<Scalar<R>> {
                                  load_.data(),
                                  step.clamped};
     backend_.parallel_for("respond to contacts", step.strands, FindResponse<T>{work}, kStrandChunk);
-    backend_.parallel_for("weigh contacts", packs(),
-                          WeighContacts<R>{pairs_, velocity_.data(), step.friction}, kPackChunk);
+    backend_.parallel_for(
+        "weigh contacts", packs(),
+        WeighContacts<R>{pairs_, velocity_.data(), step.touches ? plane_.data() : nullptr, step.friction},
+        kPackChunk);
     backend_.parallel_for("apply contacts", step.strands, ApplyContacts<T>{work}, kStrandChunk);
   }
 
   // What has not been touched stays as it is, bit for bit.
   void write_back(const HairContactStep<T>& step) {
-    const Place<T>*end = end_.data(), *velocity = velocity_.data();
+    const Place<T>*end = end_.data(), *velocity = velocity_.data(),
+          *plane = step.touches ? plane_.data() : nullptr;
     const std::int32_t* first = first_.data();
     const double* kappa = kappa_.data();
     backend_.parallel_for(
@@ -247,12 +284,15 @@ class ContactSolver : public HairContacts<Scalar<R>> {
           if (kappa[s] < 0) return;
           const StrandRows rows(step, s);
           const Vector3<T> root = root_of(step, rows, step.root_points);
-          for (std::int32_t i = step.clamped, p = first[s] + i; p < first[s + 1]; ++i, ++p) {
-            T *x = step.state.position + rows.values + i * 3 * kLanes,
-              *v = step.state.velocity + rows.values + i * 3 * kLanes;
-            const Vector3<T> moved = vector_of(end[p]) - (root + value_at(x));
+          std::int64_t at = rows.values + step.clamped * 3 * kLanes;
+          for (std::int32_t p = first[s] + step.clamped; p < first[s + 1]; ++p, at += 3 * kLanes) {
+            const Motion<T> was = motion_of(step, root, at);
+            Motion<T> now{vector_of(end[p]), vector_of(velocity[p])};
+            if (plane) now = held_particle(step, at, plane[p]).after(was, now);
+            T *x = step.state.position + at, *v = step.state.velocity + at;
+            const Vector3<T> moved = now.place - was.place;
             x[0] += moved.x, x[kLanes] += moved.y, x[2 * kLanes] += moved.z;
-            v[0] = velocity[p].x, v[kLanes] = velocity[p].y, v[2 * kLanes] = velocity[p].z;
+            v[0] = now.velocity.x, v[kLanes] = now.velocity.y, v[2 * kLanes] = now.velocity.z;
           }
         },
         kStrandChunk);
@@ -265,7 +305,7 @@ class ContactSolver : public HairContacts<Scalar<R>> {
   bool settled_ = true;  // standing_ is by how the strands are
   ContactPairs<T> pairs_{};
   std::int32_t particles_ = 0;
-  Buffer<Place<T>> start_, end_, velocity_;
+  Buffer<Place<T>> start_, end_, velocity_, plane_;
   Buffer<std::int32_t> first_, strand_, list_first_, list_entry_, cursor_;
   Buffer<Touch<T>> touch_;
   Buffer<ContactRecord<T>> record_;

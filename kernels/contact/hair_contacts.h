@@ -28,6 +28,8 @@ struct HairContactStep {
   const T* radius;                  // [rows] of the hair at each particle [m]
   std::int32_t clamped;             // prescribed particles at each root
   T friction;                       // Coulomb mu [-]
+  T step;                           // h of the substep that ends [s]
+  const T* touches;                 // [rows][kTouchReals] that solids left in the one before; null: none do
 };
 
 template <class T>

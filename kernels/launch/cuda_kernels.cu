@@ -121,6 +121,7 @@ class Strands final : public CudaStrands {
     stream_.parallel_for("shelter step", threads(), ShelterStepThread{step});
   }
   void contact_step(const ContactParameters& p) override {
+    if (p.touches && touches_.size() == 0) touches_.resize(rows_ * kTouchReals * kLanes);
     const ContactStep<float> step{batches(),
                                   state(),
                                   root_points_.data(),
@@ -136,7 +137,8 @@ class Strands final : public CudaStrands {
                                   contact_figures_.data(),
                                   p.strain_limit,
                                   p.speed_limit,
-                                  p.skipped_substeps};
+                                  p.skipped_substeps,
+                                  p.touches ? touches_.data() : nullptr};
     stream_.parallel_for("contact step", threads(), ContactStepThread{step, scratch()});
   }
 
@@ -159,11 +161,12 @@ class Strands final : public CudaStrands {
   }
   std::size_t grid_bytes() const override { return grid_ ? grid_->bytes() : 0; }
 
-  void download_figures(std::span<float> strands, std::span<float> contacts,
-                        std::span<float> lengths) override {
+  void download_figures(std::span<float> strands, std::span<float> contacts, std::span<float> lengths,
+                        std::span<float> touches) override {
     if (!strands.empty()) fetch("strand figures", strand_figures_, strands);
     if (!contacts.empty()) fetch("contact figures", contact_figures_, contacts);
     if (!lengths.empty()) fetch("length figures", length_figures_, lengths);
+    if (!touches.empty()) fetch("touches", touches_, touches);
     stream_.synchronize();
   }
   void synchronize() override { stream_.synchronize(); }
@@ -174,8 +177,8 @@ class Strands final : public CudaStrands {
            companion_velocity_.bytes() + elongation_.bytes() + air_.bytes() + exposure_.bytes() +
            shelter_.bytes() + front_.bytes() + rear_.bytes() + position_.bytes() + velocity_.bytes() +
            root_motion_.bytes() + root_points_.bytes() + skin_.bytes() + strand_figures_.bytes() +
-           contact_figures_.bytes() + length_figures_.bytes() + scratch_begin_.bytes() + scratch_.bytes() +
-           solids_.bytes() + grid_bytes();
+           contact_figures_.bytes() + length_figures_.bytes() + touches_.bytes() + scratch_begin_.bytes() +
+           scratch_.bytes() + solids_.bytes() + grid_bytes();
   }
 
  private:
@@ -230,7 +233,7 @@ class Strands final : public CudaStrands {
   DeviceBuffer<float> air_, exposure_, shelter_, front_, rear_;
   DeviceBuffer<std::int32_t> skin_;
   DeviceBuffer<double> root_points_;
-  DeviceBuffer<float> strand_figures_, contact_figures_, length_figures_;
+  DeviceBuffer<float> strand_figures_, contact_figures_, length_figures_, touches_;
   DeviceBuffer<std::int32_t> scratch_begin_;
   DeviceBuffer<float> scratch_;
   CudaSolids solids_;

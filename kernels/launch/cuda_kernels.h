@@ -57,6 +57,7 @@ struct ContactParameters {
   float strain_limit, speed_limit;  // [-], [m/s]; see ContactStep
   std::int32_t skipped_substeps;
   std::int32_t home;  // see ContactStep
+  bool touches;       // whether they are asked for
 };
 
 // The host's arrays of a state (StrandState). One that the run does without is empty; which ones are there
@@ -108,10 +109,10 @@ class CudaStrands {
   virtual void grid_shelter(const HairShelter<float>& shelter) = 0;
   virtual std::size_t grid_bytes() const = 0;  // of what `bytes` counts
 
-  // Of the last step of each kind: [batches][kFigures], [batches][kContactFigures] and
-  // [batches][kLengthFigures]; an empty span is left out.
+  // Of the last step of each kind: [batches][kFigures], [batches][kContactFigures],
+  // [batches][kLengthFigures], and ContactStep::touches where they were asked for; an empty span is left out.
   virtual void download_figures(std::span<float> strands, std::span<float> contacts,
-                                std::span<float> lengths = {}) = 0;
+                                std::span<float> lengths = {}, std::span<float> touches = {}) = 0;
 
   virtual void synchronize() = 0;
   virtual std::vector<CudaLaunches> launches() = 0;  // so far, in order of first use; empty without timing

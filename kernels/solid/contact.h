@@ -2,12 +2,12 @@
 // fast one entered (AMS paper 3.3; physics.md section 6).
 //
 // A particle found inside at x + h v first loses the part of its velocity that goes into the solid, with
-// Coulomb friction:    v' = v_solid + max(0, 1 - mu |u_n| / |u_t|) u_t,   u = v - v_solid and moves to x + h
-// v'; if that is still inside it is pushed out along the normal (the paper's sign pushes deeper). One that
-// has passed through the solid, or to the far side of a thin one, is taken back to where it entered and
-// slides on from there.
+// Coulomb friction (touch.h), and moves to x + h v'; if that is still inside it is pushed out along the
+// normal (the paper's sign pushes deeper). One that has passed through the solid, or to the far side of a
+// thin one, is taken back to where it entered and slides on from there.
 #pragma once
 #include "kernels/solid/surface.h"
+#include "kernels/solid/touch.h"
 #include "kernels/strand/strand_batch.h"
 
 namespace ringlet::kernels {
@@ -25,12 +25,6 @@ struct LaneFigures {
 // How deep a segment may dip into the solid between its particles, in voxels: hair that lies on a round head
 // is a polyline of chords. What is deeper is a thin part of the solid between two particles.
 inline constexpr float kChordVoxels = 0.25f;
-
-// Where a particle touches a solid: the surface's normal, outwards, and velocity [m/s], world axes.
-template <class T>
-struct Touch {
-  Vector3<T> normal, velocity;
-};
 
 template <class T>
 struct StrandContact {
@@ -99,20 +93,9 @@ struct StrandContact {
            (solid.blend > 0.0f && distance_to_bounds(solid.level_set[1], root) <= reach);
   }
 
-  RINGLET_FUNCTION Touch<T> touch(const SurfaceSample<T>& at) const {
-    return {world_normal(at), (T(1) / step) * surface_displacement(solid, at)};
-  }
-
-  // The velocity stage at a sample inside the solid.
-  RINGLET_FUNCTION Vector3<T> respond(const Touch<T>& touch, Vector3<T> v) const {
-    const Vector3<T> normal = touch.normal, u = v - touch.velocity;
-    const T along = dot(u, normal);
-    if (along > T(0)) return v;  // separating
-    const Vector3<T> tangential = fma(-along, normal, u);
-    const T slip = length(tangential);
-    const T keep =
-        max(T(0), fma(static_cast<T>(solid.friction) * along, inverse_or_zero(slip, T(1e-12)), T(1)));
-    return fma(keep, tangential, touch.velocity);
+  RINGLET_FUNCTION SurfaceTouch<T> touch(const SurfaceSample<T>& at) const {
+    return {world_normal(at), (T(1) / step) * surface_displacement(solid, at),
+            static_cast<T>(solid.friction)};
   }
 
   // The particle's way over the substep as the solid sees it, level-set axes [m]. A surface that deforms
@@ -181,7 +164,7 @@ RINGLET_FUNCTION Entry<T> hidden_entry(const StrandContact<T>& contact, Vector3<
 // outside the solid it is at least [m].
 template <class T>
 RINGLET_FUNCTION bool collide_particle(const StrandContact<T>& contact, Vector3<T>& x, Vector3<T>& v,
-                                       Touch<T>& touch, T& clearance, LaneFigures<T>& figures) {
+                                       SurfaceTouch<T>& touch, T& clearance, LaneFigures<T>& figures) {
   SurfaceSample<T> at = contact.sample(x);
   clearance = max(T(0), at.distance);
   const Entry<T> entry = contact.slack > T(0) ? Entry<T>{} : hidden_entry(contact, x, v, at, figures);
@@ -189,7 +172,7 @@ RINGLET_FUNCTION bool collide_particle(const StrandContact<T>& contact, Vector3<
   if (!at.exact || !(entry.found || at.distance < T(0))) return false;
   clearance = T(0);
   touch = contact.touch(at);
-  const Vector3<T> changed = contact.respond(touch, v);
+  const Vector3<T> changed = touch.respond(v);
   if (entry.found)
     x = entry.x + entry.left * contact.step * (changed - touch.velocity);
   else

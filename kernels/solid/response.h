@@ -46,12 +46,13 @@ struct ContactStep {
   T strain_limit;  // a strand that a solid moved beyond either limit counts as diverged
   T speed_limit;   // [m/s]
   std::int32_t skipped_substeps;  // since lengths were last projected: their displacement took all of these
+  T* touches;                     // [rows][kTouchReals], see touch.h; null: nobody asks
 };
 
 inline namespace RINGLET_ISA {
 
-// Position, velocity, normal, the surface's velocity, clearance, projection.
-inline constexpr int kContactReals = 3 + 3 + 3 + 3 + 1 + kProjectionReals;
+// Position, velocity, touch, clearance, projection.
+inline constexpr int kContactReals = 3 + 3 + kTouchReals + 1 + kProjectionReals;
 
 // Push-outs under this [m] do not ask for another round.
 template <class T>
@@ -70,7 +71,7 @@ template <class R>
 struct ContactPack {
   using T = Scalar<R>;
   T *position, *velocity;
-  T *normal, *surface_velocity;  // where the particle has touched last
+  T *normal, *surface_velocity, *friction;  // where the particle has touched last
   T* clearance;  // [particles] of the solid at hand: how far outside it the particle is at least
   T* projection;
   int stride;
@@ -83,8 +84,9 @@ struct ContactPack {
     T* p = array + 3 * particle * stride + lane;
     p[0] = a.x, p[stride] = a.y, p[2 * stride] = a.z;
   }
-  RINGLET_FUNCTION void set_touch(int particle, int lane, const Touch<T>& touch) const {
+  RINGLET_FUNCTION void set_touch(int particle, int lane, const SurfaceTouch<T>& touch) const {
     set(normal, particle, lane, touch.normal), set(surface_velocity, particle, lane, touch.velocity);
+    friction[particle * stride + lane] = touch.friction;
   }
 };
 
@@ -158,7 +160,7 @@ struct ContactLane {
       for (int i = first(); i < count; ++i) {
         go_to(contact, i);
         Vector3<T> x = position(i), v = pack.get(pack.velocity, i, in_pack);
-        Touch<T> touch;
+        SurfaceTouch<T> touch;
         if (!collide_particle(contact, x, v, touch, clearance(i), figures)) continue;
         figures.touched = true;
         pack.set(pack.position, i, in_pack, x), pack.set(pack.velocity, i, in_pack, v);
@@ -214,7 +216,7 @@ struct ContactLane {
   RINGLET_FUNCTION void push_particle(const StrandContact<T>& contact, int i, const SurfaceSample<T>& at,
                                       LaneFigures<T>& figures) const {
     if (!(at.distance < T(0)) || !at.exact) return;
-    const Touch<T> touch = contact.touch(at);
+    const SurfaceTouch<T> touch = contact.touch(at);
     pack.set(pack.position, i, in_pack, fma(-at.distance, touch.normal, position(i)));
     pack.set_touch(i, in_pack, touch);
     figures.touched = true;
@@ -237,13 +239,13 @@ struct ContactLane {
         const SurfaceSample<T> at = contact.sample_inside(fma(t, b - a, a));
         const T depth = T(0) - at.distance - allowed;
         if (!(depth > T(0)) || !at.exact) continue;
-        const Touch<T> touch = contact.touch(at);
+        const SurfaceTouch<T> touch = contact.touch(at);
         const T share = T(1) / fma(T(1) - t, T(1) - t, t * t);
         a = fma((T(1) - t) * share * depth, touch.normal, a), b = fma(t * share * depth, touch.normal, b);
         // The sample's velocity responds as a particle's: left alone it would come back faster every time.
         const Vector3<T> va = pack.get(pack.velocity, i, in_pack),
                          vb = pack.get(pack.velocity, i + 1, in_pack);
-        const Vector3<T> v = fma(t, vb - va, va), changed = contact.respond(touch, v) - v;
+        const Vector3<T> v = fma(t, vb - va, va), changed = touch.respond(v) - v;
         pack.set(pack.velocity, i, in_pack, fma((T(1) - t) * share, changed, va));
         pack.set(pack.velocity, i + 1, in_pack, fma(t * share, changed, vb));
         pack.set(pack.position, i, in_pack, a), pack.set_touch(i, in_pack, touch);
@@ -289,6 +291,7 @@ struct PackContacts {
              scratch + 9 * particles * stride,
              scratch + 12 * particles * stride,
              scratch + 13 * particles * stride,
+             scratch + 14 * particles * stride,
              stride},
         lengths{pack.position,
                 pack.velocity,
@@ -306,6 +309,7 @@ struct PackContacts {
       store(pack.velocity + k * stride, load<R>(v + k * kLanes));
       store(pack.normal + k * stride, R(0)), store(pack.surface_velocity + k * stride, R(0));
     }
+    for (int i = 0; i < particles; ++i) store(pack.friction + i * stride, R(0));
   }
 
   RINGLET_FUNCTION std::int64_t base() const {
@@ -413,6 +417,17 @@ struct PackContacts {
     }
   }
 
+  RINGLET_FUNCTION void write_touches() {
+    if (!step.touches) return;
+    const std::int64_t row = step.batches.row[batch];
+    for (int i = 0; i < particles; ++i) {
+      T* to = step.touches + (row + i) * kTouchReals * kLanes + lane;
+      store3<R>(to, kLanes, load3<R>(pack.normal + 3 * i * pack.stride, pack.stride));
+      store3<R>(to + 3 * kLanes, kLanes, load3<R>(pack.surface_velocity + 3 * i * pack.stride, pack.stride));
+      store(to + 6 * kLanes, load<R>(pack.friction + i * pack.stride));
+    }
+  }
+
   RINGLET_FUNCTION void write_figures() {
     R speed2 = R(0), check = R(0);  // `check` turns NaN where anything is not finite
     for (int i = 0; i < particles; ++i) {
@@ -449,6 +464,7 @@ RINGLET_FUNCTION void collide_strands(const ContactStep<Scalar<R>>& step, int ba
   else
     contacts.find_strains();  // lengths are not held, but limits and figures want to know them
   contacts.write_back(R(1) > R(0));
+  contacts.write_touches();
   if (step.length_iterations > 0) contacts.settle_stuck();
   contacts.write_figures();
 }

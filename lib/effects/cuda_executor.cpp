@@ -54,6 +54,7 @@ class CudaExecutor : public Executor<float> {
   explicit CudaExecutor(const state::StrandModel<float>& model)
       : device_(device_or_error()),
         lanes_(static_cast<std::size_t>(model.layout.batches()) * kLanes),
+        rows_(model.layout.rows() * kLanes),
         strands_(
             on_device([&] { return kernels::make_cuda_strands(model.view(), kernels::CudaTiming::kOff); })) {}
 
@@ -94,8 +95,9 @@ class CudaExecutor : public Executor<float> {
       strands_->upload_solids({step.solids, static_cast<std::size_t>(step.solid_count)}, frame);
       strands_->contact_step({step.step, step.clamped, step.rounds, step.length_iterations,
                               step.length_tolerance, step.strain_limit, step.speed_limit,
-                              step.skipped_substeps, step.home});
-      strands_->download_figures({}, {step.figures, lanes_ * kernels::kContactFigures});
+                              step.skipped_substeps, step.home, step.touches != nullptr});
+      strands_->download_figures({}, {step.figures, lanes_ * kernels::kContactFigures}, {},
+                                 {step.touches, step.touches ? rows_ * kernels::kTouchReals : 0});
     });
   }
 
@@ -123,7 +125,7 @@ class CudaExecutor : public Executor<float> {
 
  private:
   kernels::CudaDevice device_;
-  std::size_t lanes_;
+  std::size_t lanes_, rows_;
   std::unique_ptr<kernels::CudaStrands> strands_;
   bool skin_known_ = false;  // what strands grow on is the same in every step of a run
 };

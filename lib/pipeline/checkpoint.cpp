@@ -21,6 +21,7 @@ void each_array(Model& model, State& state, Arrays arrays, const Visit& visit) {
   if_there("shelter", state.shelter);
   if_there("companion_position", state.companion_position);
   if_there("companion_velocity", state.companion_velocity);
+  if_there("touches", state.touches);
   if (arrays == Arrays::kAll) {
     if_there("air", state.air);
     if_there("root_motion", state.root_motion);

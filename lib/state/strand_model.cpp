@@ -126,7 +126,7 @@ kernels::StrandState<T> StrandState<T>::view() {
 template <class T>
 std::size_t StrandState<T>::bytes() const {
   return (position.size() + velocity.size() + root_motion.size() + elongation.size() + shelter.size() +
-          companion_position.size() + companion_velocity.size()) *
+          companion_position.size() + companion_velocity.size() + touches.size()) *
              sizeof(T) +
          root_points.size() * sizeof(double);
 }
@@ -189,7 +189,8 @@ void pose_at_rest(StrandState<T>& state, const StrandModel<T>& model, std::span<
   turn_by_roots(model.layout, model.rest, roots, state.position);
   if (!model.rest_companion.empty())
     turn_by_roots(model.layout, model.rest_companion, roots, state.companion_position);
-  for (AlignedVector<T>* array : {&state.velocity, &state.companion_velocity, &state.elongation})
+  for (AlignedVector<T>* array :
+       {&state.velocity, &state.companion_velocity, &state.elongation, &state.touches})
     std::fill(array->begin(), array->end(), T(0));
   std::fill(state.shelter.begin(), state.shelter.end(), T(1));
   for (std::size_t strand = 0; strand < model.layout.strands(); ++strand)

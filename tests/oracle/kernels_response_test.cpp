@@ -92,6 +92,27 @@ TYPED_TEST(KernelResponse, IsCarriedByAMovingSolid) {
   }
 }
 
+// What is asked for: where a solid pressed, how it moves, and its friction; zeros where it did not.
+TYPED_TEST(KernelResponse, TellsWhatItTouched) {
+  constexpr double kFriction = 0.25;
+  Points rest(3, 3);  // from above, into the block, and out beside it
+  rest << Vector3d::Zero(), Vector3d(0.01, -0.01, 0), Vector3d(0.02, 0.02, 0);
+  StrandRun<TypeParam> run({oracle::make_strand(rest, {})},
+                           {RootPose{oracle::Mat3::Identity(), {0, 0.005, 0}}}, false);
+  const auto& layout = run.model.layout;
+  using T = typename TypeParam::T;
+  run.state.touches.assign(layout.rows() * kernels::kTouchReals * kernels::kLanes, T(7));
+  run.parameters.step = kStep;
+  kernels::SolidView solid = block().view(kFriction);
+  solid.translation_before[0] = -0.3 * kStep;
+  run.collide({solid});
+  const double pressed[] = {0, 1, 0, 0.3, 0, 0, kFriction};
+  for (int i = 0; i < 3; ++i)
+    for (int k = 0; k < kernels::kTouchReals; ++k)
+      EXPECT_NEAR(run.state.touches[layout.at(0, i, kernels::kTouchReals, k)], i == 1 ? pressed[k] : 0, 1e-4)
+          << i << " " << k;
+}
+
 // On a sphere of small facets: within what a neighbouring facet's normal would change, and never left inside.
 TYPED_TEST(KernelResponse, FollowsTheReferenceOnASphere) {
   constexpr double kRadius = 0.06, kFacetAngle = 0.08;

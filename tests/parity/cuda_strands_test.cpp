@@ -149,9 +149,10 @@ class Solids {
 
 TEST_F(Cuda, ContactsAgree) {
   const StrandParameters<float> parameters = default_parameters();
-  const ContactParameters contact{parameters.step, 1, 4, 3, 1e-4f, 10, 1000, 0, 0};
+  const ContactParameters contact{parameters.step, 1, 4, 3, 1e-4f, 10, 1000, 0, 0, true};
   HostGroom host(helices(100));
   host.skin[3] = kIgnoresHome;
+  host.state.touches.assign(host.model.layout.rows() * kTouchReals * kLanes, 0.0f);
   DeviceGroom device(host);
   device.strands->upload_skin(host.skin);
   Solids solids;
@@ -175,6 +176,21 @@ TEST_F(Cuda, ContactsAgree) {
   EXPECT_TRUE(position <= 1e-5) << position;
   EXPECT_TRUE(velocity <= 1e-2) << velocity;
   RecordProperty("differing_values", differing(device.position, host.state.position));
+  std::vector<float> touches(host.state.touches.size());
+  device.strands->download_figures({}, {}, {}, touches);
+  int held = 0, otherwise = 0;  // particles; those that all but touch may be either
+  const state::StrandLayout& layout = host.model.layout;
+  for (std::size_t s = 0; s < layout.strands(); ++s)
+    for (int i = 0; i < layout.count(s); ++i) {
+      Vec3 there, here;
+      for (int c = 0; c < 3; ++c) {
+        const std::size_t at = layout.at(s, i, kTouchReals, c);
+        there[c] = touches[at], here[c] = host.state.touches[at];
+      }
+      held += here.norm() > 0.5, otherwise += (there - here).norm() > 0.01;
+    }
+  EXPECT_GT(held, 50);
+  EXPECT_LT(otherwise, 0.05 * held);
 }
 
 TEST_F(Cuda, RigidSolidsAreCopiedOnce) {

@@ -149,7 +149,8 @@ struct HostGroom {
             .figures = contact_figures.data(),
             .strain_limit = 10,
             .speed_limit = 1000,
-            .skipped_substeps = 0};
+            .skipped_substeps = 0,
+            .touches = state.touches.empty() ? nullptr : state.touches.data()};
   }
   void collide(std::span<const kernels::SolidView> solids, float h) {
     for_each_lane([&, step = contact_step(solids, h)](int batch, int lane) {

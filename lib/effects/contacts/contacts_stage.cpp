@@ -60,7 +60,9 @@ class ContactsStage : public Stage<T> {
   void run(Executor<T>& executor, const Substep& substep, FrameReport& report) override {
     if (!substep.last_of_frame && !each_substep()) return;
     executor.fetch(state_);
-    const kernels::HairContactStep<T> step = contact_step();
+    kernels::HairContactStep<T> step = contact_step();
+    step.step = static_cast<T>(substep.step);
+    step.touches = state_.touches.empty() ? nullptr : state_.touches.data();
     kernels::HairContactFigures figures = contacts_->begin(step);
     const double seconds = substep.step * (each_substep() ? 1 : substep.substeps);
     std::int64_t contacts = 0;

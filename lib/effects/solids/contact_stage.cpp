@@ -22,13 +22,16 @@ class ContactStage : public Stage<T> {
         home_(skin.home),
         skin_(static_cast<std::size_t>(model.layout.batches()) * kLanes, kernels::kNoSkin),
         figures_(static_cast<std::size_t>(model.layout.batches()) * kernels::kContactFigures * kLanes) {
+    if (scene.effects.hair_hair && scene.effects.hair_hair->contacts)
+      state_.touches.assign(model.layout.rows() * kernels::kTouchReals * kLanes, T(0));
     for (std::size_t strand = 0; strand < skin.triangles.size(); ++strand)
       skin_[model.layout.at_strand(strand, 1, 0)] = skin.triangles[strand];
   }
 
   const char* name() const override { return "solids"; }
   std::size_t bytes() const override {
-    std::size_t total = skin_.size() * sizeof skin_[0] + figures_.size() * sizeof(T);
+    std::size_t total =
+        skin_.size() * sizeof skin_[0] + (figures_.size() + state_.touches.size()) * sizeof(T);
     for (const solids::Solid& solid : solids_) total += solid.bytes();
     return total;
   }
@@ -57,6 +60,7 @@ class ContactStage : public Stage<T> {
     step.strain_limit = static_cast<T>(scene_.limits.edge_strain);
     step.speed_limit = static_cast<T>(scene_.limits.speed);
     step.figures = figures_.data();
+    step.touches = state_.touches.empty() ? nullptr : state_.touches.data();
     executor.contact_step(step, substep.frame);
     gather(substep, report);
   }

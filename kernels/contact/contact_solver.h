@@ -168,11 +168,13 @@ class ContactSolver : public HairContacts<Scalar<R>> {
                                             std::int64_t row) {
     return {root + value_at(step.state.position + row), value_at(step.state.velocity + row)};
   }
-  RINGLET_KERNEL static HeldParticle<T> held_particle(const HairContactStep<T>& step, std::int64_t row,
-                                                      const Place<T>& plane) {
+  // Surfaces go on as they went against the roots, which may have been driven elsewhere since.
+  RINGLET_KERNEL static HeldParticle<T> held_particle(const HairContactStep<T>& step, const StrandRows& rows,
+                                                      std::int64_t row, const Place<T>& plane) {
     const std::int64_t lane = row % kLanes;
     const T* touch = step.touches + (row - lane) / 3 * kTouchReals + lane;
-    return {{value_at(touch), value_at(touch + 3 * kLanes), touch[6 * kLanes]}, plane, step.step};
+    const Vector3<T> velocity = value_at(touch + 3 * kLanes) + value_at(step.state.velocity + rows.values);
+    return {{value_at(touch), velocity, touch[6 * kLanes]}, plane, step.step};
   }
 
   // What solids hold, as the state now has it.
@@ -188,7 +190,7 @@ class ContactSolver : public HairContacts<Scalar<R>> {
           const Vector3<T> root = root_of(step, rows, step.root_points);
           std::int64_t at = rows.values;
           for (std::int32_t p = first[s]; p < first[s + 1]; ++p, at += 3 * kLanes)
-            plane[p] = held_particle(step, at, {}).plane_of(motion_of(step, root, at));
+            plane[p] = held_particle(step, rows, at, {}).plane_of(motion_of(step, root, at));
         },
         kStrandChunk);
   }
@@ -208,7 +210,7 @@ class ContactSolver : public HairContacts<Scalar<R>> {
           std::int64_t at = rows.values, scalar = rows.scalars;
           for (std::int32_t p = first[s]; p < first[s + 1]; ++p, at += 3 * kLanes, scalar += kLanes) {
             Motion<T> now = motion_of(step, root, at);
-            if (plane) now = held_particle(step, at, plane[p]).seen(now);
+            if (plane) now = held_particle(step, rows, at, plane[p]).seen(now);
             end[p] = {now.place.x, now.place.y, now.place.z, step.radius[scalar]};
             velocity[p] = {now.velocity.x, now.velocity.y, now.velocity.z, T(0)};
           }
@@ -288,7 +290,7 @@ class ContactSolver : public HairContacts<Scalar<R>> {
           for (std::int32_t p = first[s] + step.clamped; p < first[s + 1]; ++p, at += 3 * kLanes) {
             const Motion<T> was = motion_of(step, root, at);
             Motion<T> now{vector_of(end[p]), vector_of(velocity[p])};
-            if (plane) now = held_particle(step, at, plane[p]).after(was, now);
+            if (plane) now = held_particle(step, rows, at, plane[p]).after(was, now);
             T *x = step.state.position + at, *v = step.state.velocity + at;
             const Vector3<T> moved = now.place - was.place;
             x[0] += moved.x, x[kLanes] += moved.y, x[2 * kLanes] += moved.z;

@@ -420,10 +420,12 @@ struct PackContacts {
   RINGLET_FUNCTION void write_touches() {
     if (!step.touches) return;
     const std::int64_t row = step.batches.row[batch];
+    const Vector3<R> root = load3<R>(v, kLanes);
     for (int i = 0; i < particles; ++i) {
       T* to = step.touches + (row + i) * kTouchReals * kLanes + lane;
       store3<R>(to, kLanes, load3<R>(pack.normal + 3 * i * pack.stride, pack.stride));
-      store3<R>(to + 3 * kLanes, kLanes, load3<R>(pack.surface_velocity + 3 * i * pack.stride, pack.stride));
+      store3<R>(to + 3 * kLanes, kLanes,
+                load3<R>(pack.surface_velocity + 3 * i * pack.stride, pack.stride) - root);
       store(to + 6 * kLanes, load<R>(pack.friction + i * pack.stride));
     }
   }

@@ -6,7 +6,7 @@
 namespace ringlet::kernels {
 
 // Of a particle that a solid has pressed, [rows][kTouchReals]: the surface's normal, outwards, and velocity
-// [m/s], world axes, and Coulomb's mu [-]. The normal is 0 where none has.
+// against the strand's root [m/s], world axes, and Coulomb's mu [-]. The normal is 0 where none has.
 inline constexpr int kTouchReals = 3 + 3 + 1;
 
 inline namespace RINGLET_ISA {

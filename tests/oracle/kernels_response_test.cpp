@@ -92,7 +92,8 @@ TYPED_TEST(KernelResponse, IsCarriedByAMovingSolid) {
   }
 }
 
-// What is asked for: where a solid pressed, how it moves, and its friction; zeros where it did not.
+// What is asked for: where a solid pressed, how it moves against the root, which stands, and its friction;
+// zeros where it did not.
 TYPED_TEST(KernelResponse, TellsWhatItTouched) {
   constexpr double kFriction = 0.25;
   Points rest(3, 3);  // from above, into the block, and out beside it

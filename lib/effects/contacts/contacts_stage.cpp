@@ -27,7 +27,7 @@ class ContactsStage : public Stage<T> {
 
   const char* name() const override { return "contacts"; }
   std::size_t bytes() const override {
-    return contacts_->bytes() + lengths_.bytes() + start_.size() * sizeof(T) +
+    return contacts_->bytes() + lengths_.bytes() + (start_.size() + state_.touches.size()) * sizeof(T) +
            start_root_points_.size() * sizeof(double);
   }
   // Of the lengths, which are looked at after every pass that found contacts.

@@ -30,8 +30,7 @@ class ContactStage : public Stage<T> {
 
   const char* name() const override { return "solids"; }
   std::size_t bytes() const override {
-    std::size_t total =
-        skin_.size() * sizeof skin_[0] + (figures_.size() + state_.touches.size()) * sizeof(T);
+    std::size_t total = skin_.size() * sizeof skin_[0] + figures_.size() * sizeof(T);
     for (const solids::Solid& solid : solids_) total += solid.bytes();
     return total;
   }

@@ -145,13 +145,14 @@ class HairRun {
   void set_velocity(std::size_t strand, int i, const Vec3& v) {
     for (int c = 0; c < 3; ++c) state.velocity[model.layout.at(strand, i, 3, c)] = T(v[c]);
   }
-  // A solid has pressed the particle.
+  // A solid has pressed the particle, of a strand whose root moves as it now does.
   void hold(std::size_t strand, int i, const Vec3& normal, const Vec3& surface_velocity, double friction) {
     using kernels::kTouchReals;
     if (state.touches.empty()) state.touches.assign(model.layout.rows() * kTouchReals * kLanes, T(0));
     for (int c = 0; c < 3; ++c) {
       state.touches[model.layout.at(strand, i, kTouchReals, c)] = T(normal[c]);
-      state.touches[model.layout.at(strand, i, kTouchReals, 3 + c)] = T(surface_velocity[c]);
+      state.touches[model.layout.at(strand, i, kTouchReals, 3 + c)] =
+          T(surface_velocity[c] - velocity(strand, 0)[c]);
     }
     state.touches[model.layout.at(strand, i, kTouchReals, 6)] = T(friction);
   }

@@ -145,16 +145,18 @@ class HairRun {
   void set_velocity(std::size_t strand, int i, const Vec3& v) {
     for (int c = 0; c < 3; ++c) state.velocity[model.layout.at(strand, i, 3, c)] = T(v[c]);
   }
-  // A solid has pressed the particle, of a strand whose root moves as it now does.
-  void hold(std::size_t strand, int i, const Vec3& normal, const Vec3& surface_velocity, double friction) {
+  // A solid has pressed the particle; `home`: it goes on with the root.
+  void hold(std::size_t strand, int i, const Vec3& normal, const Vec3& velocity, double friction,
+            bool home = false) {
     using kernels::kTouchReals;
     if (state.touches.empty()) state.touches.assign(model.layout.rows() * kTouchReals * kLanes, T(0));
-    for (int c = 0; c < 3; ++c) {
-      state.touches[model.layout.at(strand, i, kTouchReals, c)] = T(normal[c]);
-      state.touches[model.layout.at(strand, i, kTouchReals, 3 + c)] =
-          T(surface_velocity[c] - velocity(strand, 0)[c]);
-    }
-    state.touches[model.layout.at(strand, i, kTouchReals, 6)] = T(friction);
+    const auto real = [&](int k) -> T& { return state.touches[model.layout.at(strand, i, kTouchReals, k)]; };
+    for (int c = 0; c < 3; ++c)
+      real(kernels::kTouchNormal + c) = T(normal[c]), real(kernels::kTouchVelocity + c) = T(velocity[c]);
+    real(kernels::kTouchFriction) = T(friction), real(kernels::kTouchHome) = T(home);
+  }
+  double load(std::size_t strand, int i) const {
+    return state.touches[model.layout.at(strand, i, kernels::kTouchReals, kernels::kTouchLoad)];
   }
   void set_radius(std::size_t strand, double radius) {
     for (int i = 0; i < count(strand); ++i) radius_[model.layout.at(strand, i, 1, 0)] = T(radius);

@@ -90,8 +90,8 @@ struct FindContacts {
 // is safe. Velocities are not, for they would bounce.
 inline constexpr double kRelaxation = 1.5;
 
-// Hair that solids press together from both sides, and that gives way by less than this share of what it
-// would do freely, is left to them.
+// Hair that solids hold so that it gives way by less than this share of what it would do freely, as where it
+// is pressed together from both sides, is left to them: ever more, the less it gives way.
 inline constexpr double kSqueezed = 0.1;
 
 // Impulses of a pack of pairs, in the place of what they are made of.
@@ -120,7 +120,8 @@ struct WeighContacts {
     if (plane) {
       const R held = held_response(plane, pairs.a + first, s, a, normal) +
                      held_response(plane, pairs.b + first, u, b, R(T(-1)) * normal);
-      mass.along = select(held < R(T(kSqueezed)) * free, R(0), inverse_or_zero(held, R(T(1e-6))));
+      const R least = R(T(kSqueezed)) * free, most = max(held, least);
+      mass.along = held * inverse_or_zero(most * most, R(T(1e-12)));
     }
     const Vector3<R> speed = a.places.at(s) - b.places.at(u);
     const R mu(friction);

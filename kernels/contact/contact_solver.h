@@ -168,13 +168,20 @@ class ContactSolver : public HairContacts<Scalar<R>> {
                                             std::int64_t row) {
     return {root + value_at(step.state.position + row), value_at(step.state.velocity + row)};
   }
-  // Surfaces go on as they went against the roots, which may have been driven elsewhere since.
+  RINGLET_KERNEL static T* touch_at(const HairContactStep<T>& step, std::int64_t row) {
+    const std::int64_t lane = row % kLanes;
+    return step.touches + (row - lane) / 3 * kTouchReals + lane;
+  }
+  // The head has gone on with the roots, other solids as they went.
   RINGLET_KERNEL static HeldParticle<T> held_particle(const HairContactStep<T>& step, const StrandRows& rows,
                                                       std::int64_t row, const Place<T>& plane) {
-    const std::int64_t lane = row % kLanes;
-    const T* touch = step.touches + (row - lane) / 3 * kTouchReals + lane;
-    const Vector3<T> velocity = value_at(touch + 3 * kLanes) + value_at(step.state.velocity + rows.values);
-    return {{value_at(touch), velocity, touch[6 * kLanes]}, plane, step.step};
+    const T* touch = touch_at(step, row);
+    const T home = touch[kTouchHome * kLanes];
+    const Vector3<T> velocity =
+        fma(home, value_at(step.state.velocity + rows.values), value_at(touch + kTouchVelocity * kLanes));
+    return {{value_at(touch), velocity, touch[kTouchFriction * kLanes], home, touch[kTouchLoad * kLanes]},
+            plane,
+            step.step};
   }
 
   // What solids hold, as the state now has it.
@@ -290,7 +297,9 @@ class ContactSolver : public HairContacts<Scalar<R>> {
           for (std::int32_t p = first[s] + step.clamped; p < first[s + 1]; ++p, at += 3 * kLanes) {
             const Motion<T> was = motion_of(step, root, at);
             Motion<T> now{vector_of(end[p]), vector_of(velocity[p])};
-            if (plane) now = held_particle(step, rows, at, plane[p]).after(was, now);
+            if (plane)
+              now = held_particle(step, rows, at, plane[p])
+                        .after(was, now, touch_at(step, at)[kTouchLoad * kLanes]);
             T *x = step.state.position + at, *v = step.state.velocity + at;
             const Vector3<T> moved = now.place - was.place;
             x[0] += moved.x, x[kLanes] += moved.y, x[2 * kLanes] += moved.z;

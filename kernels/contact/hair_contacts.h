@@ -29,7 +29,7 @@ struct HairContactStep {
   std::int32_t clamped;             // prescribed particles at each root
   T friction;                       // Coulomb mu [-]
   T step;                           // h of the substep that ends [s]
-  const T* touches;                 // [rows][kTouchReals] that solids left in the one before; null: none do
+  T* touches;  // [rows][kTouchReals] that solids left in the one before, loads are added; null: none do
 };
 
 template <class T>
@@ -43,7 +43,7 @@ class HairContacts {
   virtual HairContactFigures begin(const HairContactStep<T>& step) = 0;
   // One pass, over the state as it now is. Returns how many contacts it found.
   virtual std::int64_t pass(const HairContactStep<T>& step) = 0;
-  // Sets the figures' crossings and depth, by the state as it now is.
+  // Sets the figures' crossings and depth, by the state as it now is and solids will leave it.
   virtual void count_crossings(const HairContactStep<T>& step, HairContactFigures& figures) = 0;
   // What `settle` kept, to go on from there another time: how many numbers, and the numbers. `keep` is for
   // after a `begin` with the same strands; false, and nothing kept, where these are no numbers of theirs.

@@ -121,7 +121,7 @@ class Strands final : public CudaStrands {
     stream_.parallel_for("shelter step", threads(), ShelterStepThread{step});
   }
   void contact_step(const ContactParameters& p) override {
-    if (p.touches && touches_.size() == 0) touches_.resize(rows_ * kTouchReals * kLanes);
+    if (p.touches && touches_.size() == 0) touches_.resize(rows_ * kTouchReals * kLanes), clear(touches_);
     const ContactStep<float> step{batches(),
                                   state(),
                                   root_points_.data(),
@@ -140,6 +140,11 @@ class Strands final : public CudaStrands {
                                   p.skipped_substeps,
                                   p.touches ? touches_.data() : nullptr};
     stream_.parallel_for("contact step", threads(), ContactStepThread{step, scratch()});
+  }
+
+  void upload_touches(std::span<const float> touches) override {
+    touches_.resize(touches.size());
+    send("touches", touches, touches_);
   }
 
   void length_step(const LengthStep<float>& host) override {

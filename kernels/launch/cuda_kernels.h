@@ -99,6 +99,8 @@ class CudaStrands {
   // pointers change.
   virtual void upload_solids(std::span<const SolidView> solids, std::int64_t interval) = 0;
   virtual void contact_step(const ContactParameters& parameters) = 0;
+  // ContactStep::touches, of which the step reads the loads. Until called there are none.
+  virtual void upload_touches(std::span<const float> touches) = 0;
 
   virtual void length_step(const LengthStep<float>& step) = 0;  // pointers as strand_step's
 

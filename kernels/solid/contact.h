@@ -37,6 +37,7 @@ struct StrandContact {
   // How deep a particle may lie in the solid [m]: of one in which the root is buried, less the hair from
   // there.
   T slack = T(0);
+  T home = T(0);  // 1 for the solid that strands grow on
 
   RINGLET_FUNCTION StrandContact(const SolidView& s, const Vector3<double>& root_point, T h)
       : solid(s),
@@ -94,8 +95,8 @@ struct StrandContact {
   }
 
   RINGLET_FUNCTION SurfaceTouch<T> touch(const SurfaceSample<T>& at) const {
-    return {world_normal(at), (T(1) / step) * surface_displacement(solid, at),
-            static_cast<T>(solid.friction)};
+    return {world_normal(at), (T(1) / step) * surface_displacement(solid, at), static_cast<T>(solid.friction),
+            home};
   }
 
   // The particle's way over the substep as the solid sees it, level-set axes [m]. A surface that deforms
@@ -160,8 +161,8 @@ RINGLET_FUNCTION Entry<T> hidden_entry(const StrandContact<T>& contact, Vector3<
   return suspect ? find_entry(contact, p, way, distance, inside) : Entry<T>{};
 }
 
-// The velocity and push-out stages for one particle; true where it touched. `clearance` becomes how far
-// outside the solid it is at least [m].
+// The velocity and push-out stages for one particle; true where it touched. `touch` comes with the load on
+// it; `clearance` becomes how far outside the solid the particle is at least [m].
 template <class T>
 RINGLET_FUNCTION bool collide_particle(const StrandContact<T>& contact, Vector3<T>& x, Vector3<T>& v,
                                        SurfaceTouch<T>& touch, T& clearance, LaneFigures<T>& figures) {
@@ -171,7 +172,8 @@ RINGLET_FUNCTION bool collide_particle(const StrandContact<T>& contact, Vector3<
   if (entry.found) at = contact.sample(entry.x);
   if (!at.exact || !(entry.found || at.distance < T(0))) return false;
   clearance = T(0);
-  touch = contact.touch(at);
+  const T load = touch.load;
+  touch = contact.touch(at), touch.load = load;
   const Vector3<T> changed = touch.respond(v);
   if (entry.found)
     x = entry.x + entry.left * contact.step * (changed - touch.velocity);

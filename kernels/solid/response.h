@@ -51,8 +51,8 @@ struct ContactStep {
 
 inline namespace RINGLET_ISA {
 
-// Position, velocity, touch, clearance, projection.
-inline constexpr int kContactReals = 3 + 3 + kTouchReals + 1 + kProjectionReals;
+// Position, velocity, touch but for its load, clearance, projection.
+inline constexpr int kContactReals = 3 + 3 + kTouchLoad + 1 + kProjectionReals;
 
 // Push-outs under this [m] do not ask for another round.
 template <class T>
@@ -71,7 +71,7 @@ template <class R>
 struct ContactPack {
   using T = Scalar<R>;
   T *position, *velocity;
-  T *normal, *surface_velocity, *friction;  // where the particle has touched last
+  T *normal, *surface_velocity, *friction, *home;  // where the particle has touched last
   T* clearance;  // [particles] of the solid at hand: how far outside it the particle is at least
   T* projection;
   int stride;
@@ -86,7 +86,7 @@ struct ContactPack {
   }
   RINGLET_FUNCTION void set_touch(int particle, int lane, const SurfaceTouch<T>& touch) const {
     set(normal, particle, lane, touch.normal), set(surface_velocity, particle, lane, touch.velocity);
-    friction[particle * stride + lane] = touch.friction;
+    friction[particle * stride + lane] = touch.friction, home[particle * stride + lane] = touch.home;
   }
 };
 
@@ -106,7 +106,7 @@ struct ContactLane {
     StrandContact<T> contact(step.solids[solid],
                              step.root_points + static_cast<std::int64_t>(batch) * 3 * kLanes + lane,
                              step.step);
-    if (solid == step.home) contact.skin = skin;
+    if (solid == step.home) contact.skin = skin, contact.home = T(1);
     return contact;
   }
   // Begins a walk along the strand. Roots lie on the home solid, and deeper in it only as a groom is kept
@@ -161,6 +161,7 @@ struct ContactLane {
         go_to(contact, i);
         Vector3<T> x = position(i), v = pack.get(pack.velocity, i, in_pack);
         SurfaceTouch<T> touch;
+        touch.load = load(i);
         if (!collide_particle(contact, x, v, touch, clearance(i), figures)) continue;
         figures.touched = true;
         pack.set(pack.position, i, in_pack, x), pack.set(pack.velocity, i, in_pack, v);
@@ -211,6 +212,10 @@ struct ContactLane {
  private:
   RINGLET_FUNCTION T& clearance(int i) const { return pack.clearance[i * pack.stride + in_pack]; }
   RINGLET_FUNCTION Vector3<T> position(int i) const { return pack.get(pack.position, i, in_pack); }
+  RINGLET_FUNCTION T load(int i) const {
+    const std::int64_t row = step.batches.row[batch] + i;
+    return step.touches ? step.touches[(row * kTouchReals + kTouchLoad) * kLanes + lane] : T(0);
+  }
 
   // Out of the solid, without a change of the particle's own velocity; notes the touch.
   RINGLET_FUNCTION void push_particle(const StrandContact<T>& contact, int i, const SurfaceSample<T>& at,
@@ -292,6 +297,7 @@ struct PackContacts {
              scratch + 12 * particles * stride,
              scratch + 13 * particles * stride,
              scratch + 14 * particles * stride,
+             scratch + 15 * particles * stride,
              stride},
         lengths{pack.position,
                 pack.velocity,
@@ -309,7 +315,8 @@ struct PackContacts {
       store(pack.velocity + k * stride, load<R>(v + k * kLanes));
       store(pack.normal + k * stride, R(0)), store(pack.surface_velocity + k * stride, R(0));
     }
-    for (int i = 0; i < particles; ++i) store(pack.friction + i * stride, R(0));
+    for (int i = 0; i < particles; ++i)
+      store(pack.friction + i * stride, R(0)), store(pack.home + i * stride, R(0));
   }
 
   RINGLET_FUNCTION std::int64_t base() const {
@@ -417,16 +424,24 @@ struct PackContacts {
     }
   }
 
+  // A solid that jumps is not taken to go on at that speed: along the normal no faster than the particle
+  // does.
   RINGLET_FUNCTION void write_touches() {
     if (!step.touches) return;
     const std::int64_t row = step.batches.row[batch];
     const Vector3<R> root = load3<R>(v, kLanes);
     for (int i = 0; i < particles; ++i) {
+      const int at = 3 * i * pack.stride;
+      const Vector3<R> normal = load3<R>(pack.normal + at, pack.stride),
+                       surface = load3<R>(pack.surface_velocity + at, pack.stride),
+                       own = load3<R>(pack.velocity + at, pack.stride);
+      const R home = load<R>(pack.home + i * pack.stride);
+      const Vector3<R> followed = fma(min(R(0), dot(own - surface, normal)), normal, surface);
       T* to = step.touches + (row + i) * kTouchReals * kLanes + lane;
-      store3<R>(to, kLanes, load3<R>(pack.normal + 3 * i * pack.stride, pack.stride));
-      store3<R>(to + 3 * kLanes, kLanes,
-                load3<R>(pack.surface_velocity + 3 * i * pack.stride, pack.stride) - root);
-      store(to + 6 * kLanes, load<R>(pack.friction + i * pack.stride));
+      store3<R>(to + kTouchNormal * kLanes, kLanes, normal);
+      store3<R>(to + kTouchVelocity * kLanes, kLanes, fma(R(0) - home, root, followed));
+      store(to + kTouchFriction * kLanes, load<R>(pack.friction + i * pack.stride));
+      store(to + kTouchHome * kLanes, home), store(to + kTouchLoad * kLanes, R(0));
     }
   }
 
@@ -466,7 +481,7 @@ RINGLET_FUNCTION void collide_strands(const ContactStep<Scalar<R>>& step, int ba
   else
     contacts.find_strains();  // lengths are not held, but limits and figures want to know them
   contacts.write_back(R(1) > R(0));
-  contacts.write_touches();
+  contacts.write_touches();  // before the last resort forgets them
   if (step.length_iterations > 0) contacts.settle_stuck();
   contacts.write_figures();
 }

@@ -93,11 +93,12 @@ class CudaExecutor : public Executor<float> {
       if (!skin_known_) strands_->upload_skin({step.skin, lanes_});
       skin_known_ = true;
       strands_->upload_solids({step.solids, static_cast<std::size_t>(step.solid_count)}, frame);
+      const std::span<float> touches(step.touches, step.touches ? rows_ * kernels::kTouchReals : 0);
+      if (step.touches) strands_->upload_touches(touches);
       strands_->contact_step({step.step, step.clamped, step.rounds, step.length_iterations,
                               step.length_tolerance, step.strain_limit, step.speed_limit,
                               step.skipped_substeps, step.home, step.touches != nullptr});
-      strands_->download_figures({}, {step.figures, lanes_ * kernels::kContactFigures}, {},
-                                 {step.touches, step.touches ? rows_ * kernels::kTouchReals : 0});
+      strands_->download_figures({}, {step.figures, lanes_ * kernels::kContactFigures}, {}, touches);
     });
   }
 

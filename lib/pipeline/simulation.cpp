@@ -452,6 +452,8 @@ state::Snapshot TypedSimulation<T>::snapshot(int frame) {
 template <class T>
 void TypedSimulation<T>::resume(const state::Snapshot& snapshot) {
   restore(snapshot, model_, state_, kept());
+  if (!std::all_of(state_.touches.begin(), state_.touches.end(), [](T a) { return std::isfinite(a); }))
+    throw Error(ErrorKind::kInput, "state", "`touches` holds what is no number", "run without --resume");
   if (control_) control_->restore(snapshot);
   roots_.pose(time_of(snapshot.frame), now_);
   for (std::size_t s = 0; s < now_.size(); ++s) set_root_motion(state_, model_.layout, s, now_[s], now_[s]);

@@ -62,8 +62,8 @@ struct StrandState {
   AlignedVector<T> shelter;  // [rows] share of the wind that hair before it lets through to the segment that
                              // begins there, when last looked at; 1 before that
   AlignedVector<T> companion_position, companion_velocity;  // [rows][3] kernels::StrandState
-  AlignedVector<T> touches;  // [rows][kTouchReals] where solids pressed (kernels/solid/touch.h); empty where
-                             // nothing asks
+  AlignedVector<T> touches;  // [rows][kTouchReals] where solids pressed last (kernels/solid/touch.h); empty
+                             // where nothing asks
   Vec3 wind = Vec3::Zero();  // the mean wind now [m/s]; zero without such an effect
 
   explicit StrandState(const StrandModel<T>& model);

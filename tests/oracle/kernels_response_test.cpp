@@ -92,26 +92,54 @@ TYPED_TEST(KernelResponse, IsCarriedByAMovingSolid) {
   }
 }
 
-// What is asked for: where a solid pressed, how it moves against the root, which stands, and its friction;
-// zeros where it did not.
+// What is asked for: where a solid pressed, how it moves, against the root where strands grow on it, and its
+// friction; zeros where it did not.
 TYPED_TEST(KernelResponse, TellsWhatItTouched) {
+  using T = typename TypeParam::T;
   constexpr double kFriction = 0.25;
   Points rest(3, 3);  // from above, into the block, and out beside it
   rest << Vector3d::Zero(), Vector3d(0.01, -0.01, 0), Vector3d(0.02, 0.02, 0);
-  StrandRun<TypeParam> run({oracle::make_strand(rest, {})},
-                           {RootPose{oracle::Mat3::Identity(), {0, 0.005, 0}}}, false);
-  const auto& layout = run.model.layout;
+  for (const bool home : {false, true}) {
+    StrandRun<TypeParam> run({oracle::make_strand(rest, {})},
+                             {RootPose{oracle::Mat3::Identity(), {0, 0.005, 0}}}, false);
+    const auto& layout = run.model.layout;
+    run.state.touches.assign(layout.rows() * kernels::kTouchReals * kernels::kLanes, T(0));
+    run.home = home ? 0 : -1;
+    oracle::State state = run.get(0);
+    state.velocity.col(0) = Vector3d(0.1, 0.2, -0.3);
+    run.set(0, state);
+    run.parameters.step = kStep;
+    kernels::SolidView solid = block().view(kFriction);
+    solid.translation_before[0] = -0.3 * kStep;
+    run.collide({solid});
+    const double pressed[] = {0, 1, 0, 0.3 - 0.1 * home, -0.2 * home, 0.3 * home, kFriction, double(home), 0};
+    for (const int i : {1, 2})
+      for (int k = 0; k < kernels::kTouchReals; ++k)
+        EXPECT_NEAR(run.state.touches[layout.at(0, i, kernels::kTouchReals, k)], i == 1 ? pressed[k] : 0,
+                    1e-4)
+            << home << " " << i << " " << k;
+  }
+}
+
+// The friction on what other hair presses on counts that: Coulomb's cone with the load.
+TYPED_TEST(KernelResponse, FeelsTheLoad) {
   using T = typename TypeParam::T;
-  run.state.touches.assign(layout.rows() * kernels::kTouchReals * kernels::kLanes, T(7));
-  run.parameters.step = kStep;
-  kernels::SolidView solid = block().view(kFriction);
-  solid.translation_before[0] = -0.3 * kStep;
-  run.collide({solid});
-  const double pressed[] = {0, 1, 0, 0.3, 0, 0, kFriction};
-  for (int i = 0; i < 3; ++i)
-    for (int k = 0; k < kernels::kTouchReals; ++k)
-      EXPECT_NEAR(run.state.touches[layout.at(0, i, kernels::kTouchReals, k)], i == 1 ? pressed[k] : 0, 1e-4)
-          << i << " " << k;
+  Points rest(3, 2);
+  rest << Vector3d::Zero(), Vector3d(0, -0.005, 0);
+  for (const double load : {0.0, 1.0, 100.0}) {
+    StrandRun<TypeParam> run({oracle::make_strand(rest, {})},
+                             {RootPose{oracle::Mat3::Identity(), {0, 0.004, 0}}}, false);
+    const auto& layout = run.model.layout;
+    run.state.touches.assign(layout.rows() * kernels::kTouchReals * kernels::kLanes, T(0));
+    run.state.touches[layout.at(0, 1, kernels::kTouchReals, kernels::kTouchLoad)] = T(load);
+    oracle::State state = run.get(0);
+    state.velocity.col(1) = Vector3d(3, -2, 0);
+    run.set(0, state);
+    run.parameters.step = kStep;
+    run.collide({block().view(0.5)});
+    EXPECT_NEAR(run.get(0).velocity(0, 1), std::max(0.0, 3 - 0.5 * (2 + load)), 1e-4) << load;
+    EXPECT_EQ(run.state.touches[layout.at(0, 1, kernels::kTouchReals, kernels::kTouchLoad)], 0);
+  }
 }
 
 // On a sphere of small facets: within what a neighbouring facet's normal would change, and never left inside.

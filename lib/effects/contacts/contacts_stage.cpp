@@ -27,7 +27,7 @@ class ContactsStage : public Stage<T> {
 
   const char* name() const override { return "contacts"; }
   std::size_t bytes() const override {
-    return contacts_->bytes() + lengths_.bytes() + (start_.size() + state_.touches.size()) * sizeof(T) +
+    return contacts_->bytes() + lengths_.bytes() + start_.size() * sizeof(T) +
            start_root_points_.size() * sizeof(double);
   }
   // Of the lengths, which are looked at after every pass that found contacts.
@@ -62,7 +62,6 @@ class ContactsStage : public Stage<T> {
     executor.fetch(state_);
     kernels::HairContactStep<T> step = contact_step();
     step.step = static_cast<T>(substep.step);
-    step.touches = state_.touches.empty() ? nullptr : state_.touches.data();
     kernels::HairContactFigures figures = contacts_->begin(step);
     const double seconds = substep.step * (each_substep() ? 1 : substep.substeps);
     std::int64_t contacts = 0;
@@ -118,6 +117,7 @@ class ContactsStage : public Stage<T> {
     step.radius = model_.radius.data();
     step.clamped = scene_.model.clamped_particles;
     step.friction = static_cast<T>(options_.friction);
+    step.touches = state_.touches.empty() ? nullptr : state_.touches.data();
     return step;
   }
 

@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "core/log.h"
+#include "kernels/solid/touch.h"
 #include "solids/mesh_distance.h"
 
 namespace ringlet::effects {
@@ -109,6 +110,10 @@ void Grooming<T>::write(std::size_t strand, const groom::EditedStrand& edited,
     if (k >= before.velocity.size() || edited.velocity[k] != before.velocity[k])
       put(state_.velocity, i, edited.velocity[k]);
   }
+  // Nor does what pressed it where it was.
+  for (int i = 0; !state_.touches.empty() && i < room; ++i)
+    for (int k = 0; k < kernels::kTouchReals; ++k)
+      state_.touches[model_.layout.at(strand, i, kernels::kTouchReals, k)] = T(0);
   // What hair has suffered it keeps, whatever its new shape; particles that are new have suffered nothing and
   // stand free.
   for (int i = 0; i < room; ++i) {

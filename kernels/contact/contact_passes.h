@@ -101,7 +101,7 @@ struct WeighContacts {
   static constexpr int kWidth = Traits<R>::kWidth;
   ContactPairs<T> pairs;
   const Place<T>* velocity;  // extra: how the particle responds to all contacts of its strand
-  const Place<T>* plane;     // of particles that solids hold (HeldParticle); null: none do
+  const Place<T>* held;      // normals of the planes that particles lie in, or 0; null: in none
   T friction;
 
   RINGLET_FUNCTION void operator()(std::int32_t pack) const {
@@ -117,11 +117,11 @@ struct WeighContacts {
                              b = gather_segment<R>(velocity, pairs.b + first);
     const R free = a.extra_at(s) + b.extra_at(u), across_mass = inverse_or_zero(free, R(T(1e-6)));
     ContactMass<R> mass{across_mass, across_mass};
-    if (plane) {
-      const R held = held_response(plane, pairs.a + first, s, a, normal) +
-                     held_response(plane, pairs.b + first, u, b, R(T(-1)) * normal);
-      const R least = R(T(kSqueezed)) * free, most = max(held, least);
-      mass.along = held * inverse_or_zero(most * most, R(T(1e-12)));
+    if (held) {
+      const R left = held_response(held, pairs.a + first, s, a, normal) +
+                     held_response(held, pairs.b + first, u, b, R(T(-1)) * normal);
+      const R least = R(T(kSqueezed)) * free, most = max(left, least);
+      mass.along = left * inverse_or_zero(most * most, R(T(1e-12)));
     }
     const Vector3<R> speed = a.places.at(s) - b.places.at(u);
     const R mu(friction);

@@ -88,9 +88,10 @@ class ContactSolver : public HairContacts<Scalar<R>> {
 
   std::size_t bytes() const override {
     return backend_.bytes() + first_.bytes() + strand_.bytes() + start_.bytes() + end_.bytes() +
-           velocity_.bytes() + plane_.bytes() + list_first_.bytes() + list_entry_.bytes() + cursor_.bytes() +
-           touch_.bytes() + record_.bytes() + active_.bytes() + list_.bytes() + load_.bytes() +
-           share_.bytes() + elimination_.bytes() + kappa_.bytes() + neighbours_.bytes() + standing_.bytes();
+           velocity_.bytes() + plane_.bytes() + held_.bytes() + list_first_.bytes() + list_entry_.bytes() +
+           cursor_.bytes() + touch_.bytes() + record_.bytes() + active_.bytes() + list_.bytes() +
+           load_.bytes() + share_.bytes() + elimination_.bytes() + kappa_.bytes() + neighbours_.bytes() +
+           standing_.bytes();
   }
 
  private:
@@ -184,10 +185,10 @@ class ContactSolver : public HairContacts<Scalar<R>> {
             step.step};
   }
 
-  // What solids hold, as the state now has it.
+  // The planes that solids hold particles in, as the state now has it.
   void find_held(const HairContactStep<T>& step) {
     if (!step.touches) return;
-    plane_.resize(particles_);
+    plane_.resize(particles_), held_.resize(particles_);
     Place<T>* plane = plane_.data();
     const std::int32_t* first = first_.data();
     backend_.parallel_for(
@@ -208,6 +209,7 @@ class ContactSolver : public HairContacts<Scalar<R>> {
     end_.resize(particles_), velocity_.resize(particles_);
     Place<T>*end = end_.data(), *velocity = velocity_.data();
     const Place<T>* plane = as == As::kHeld && step.touches ? plane_.data() : nullptr;
+    Place<T>* held = held_.data();
     const std::int32_t* first = first_.data();
     backend_.parallel_for(
         "lay out end", step.strands,
@@ -217,7 +219,12 @@ class ContactSolver : public HairContacts<Scalar<R>> {
           std::int64_t at = rows.values, scalar = rows.scalars;
           for (std::int32_t p = first[s]; p < first[s + 1]; ++p, at += 3 * kLanes, scalar += kLanes) {
             Motion<T> now = motion_of(step, root, at);
-            if (plane) now = held_particle(step, rows, at, plane[p]).seen(now);
+            if (plane) {
+              const HeldParticle<T> particle = held_particle(step, rows, at, plane[p]);
+              const bool holds = particle.holds(now);
+              held[p] = holds ? plane[p] : Place<T>{};
+              if (holds) now = particle.seen(now);
+            }
             end[p] = {now.place.x, now.place.y, now.place.z, step.radius[scalar]};
             velocity[p] = {now.velocity.x, now.velocity.y, now.velocity.z, T(0)};
           }
@@ -276,7 +283,7 @@ class ContactSolver : public HairContacts<Scalar<R>> {
     backend_.parallel_for("respond to contacts", step.strands, FindResponse<T>{work}, kStrandChunk);
     backend_.parallel_for(
         "weigh contacts", packs(),
-        WeighContacts<R>{pairs_, velocity_.data(), step.touches ? plane_.data() : nullptr, step.friction},
+        WeighContacts<R>{pairs_, velocity_.data(), step.touches ? held_.data() : nullptr, step.friction},
         kPackChunk);
     backend_.parallel_for("apply contacts", step.strands, ApplyContacts<T>{work}, kStrandChunk);
   }
@@ -284,7 +291,7 @@ class ContactSolver : public HairContacts<Scalar<R>> {
   // What has not been touched stays as it is, bit for bit.
   void write_back(const HairContactStep<T>& step) {
     const Place<T>*end = end_.data(), *velocity = velocity_.data(),
-          *plane = step.touches ? plane_.data() : nullptr;
+          *held = step.touches ? held_.data() : nullptr;
     const std::int32_t* first = first_.data();
     const double* kappa = kappa_.data();
     backend_.parallel_for(
@@ -297,8 +304,8 @@ class ContactSolver : public HairContacts<Scalar<R>> {
           for (std::int32_t p = first[s] + step.clamped; p < first[s + 1]; ++p, at += 3 * kLanes) {
             const Motion<T> was = motion_of(step, root, at);
             Motion<T> now{vector_of(end[p]), vector_of(velocity[p])};
-            if (plane)
-              now = held_particle(step, rows, at, plane[p])
+            if (held && dot(vector_of(held[p]), vector_of(held[p])) > T(0))
+              now = held_particle(step, rows, at, held[p])
                         .after(was, now, touch_at(step, at)[kTouchLoad * kLanes]);
             T *x = step.state.position + at, *v = step.state.velocity + at;
             const Vector3<T> moved = now.place - was.place;
@@ -316,7 +323,7 @@ class ContactSolver : public HairContacts<Scalar<R>> {
   bool settled_ = true;  // standing_ is by how the strands are
   ContactPairs<T> pairs_{};
   std::int32_t particles_ = 0;
-  Buffer<Place<T>> start_, end_, velocity_, plane_;
+  Buffer<Place<T>> start_, end_, velocity_, plane_, held_;
   Buffer<std::int32_t> first_, strand_, list_first_, list_entry_, cursor_;
   Buffer<Touch<T>> touch_;
   Buffer<ContactRecord<T>> record_;

@@ -26,33 +26,38 @@ struct HeldParticle {
   T step;          // h [s]
   static constexpr T kLifted = T(1e-6), kLeaving = T(1e-5);  // [m], [m/s]; less is rounding
 
-  RINGLET_KERNEL bool held() const { return dot(vector_of(plane), vector_of(plane)) > T(0); }
-  RINGLET_KERNEL T height(Vector3<T> place) const { return dot(vector_of(plane), place) - plane.extra; }
-
   // The plane of a particle that moves so: none where it leaves the solid.
   RINGLET_KERNEL Place<T> plane_of(const Motion<T>& motion) const {
     if (!(dot(motion.velocity - touch.velocity, touch.normal) < T(0))) return {};
     const Vector3<T> n = touch.normal;
     return {n.x, n.y, n.z, dot(n, respond(motion).place)};
   }
-  RINGLET_KERNEL Motion<T> seen(const Motion<T>& motion) const {
-    if (!held()) return motion;
+  // Whether it lies in its plane still: contacts may have lifted it, or sent it off.
+  RINGLET_KERNEL bool holds(const Motion<T>& motion) const {
+    const Vector3<T> n = vector_of(plane);
+    if (!(dot(n, n) > T(0))) return false;
     const Motion<T> left = respond(motion);
-    const T above = height(left.place);
-    if (above > kLifted) return motion;
-    return {fma(max(T(0), T(0) - above), vector_of(plane), left.place), left.velocity};
+    return dot(n, left.place) - plane.extra <= kLifted && dot(left.velocity - touch.velocity, n) <= kLeaving;
   }
-  // What becomes of `motion` where contacts have made `now` of what they have seen. Adds to the load.
+  // As the solid will leave it that holds it.
+  RINGLET_KERNEL Motion<T> seen(const Motion<T>& motion) const {
+    const Motion<T> left = respond(motion);
+    const Vector3<T> n = vector_of(plane);
+    return {fma(max(T(0), plane.extra - dot(n, left.place)), n, left.place), left.velocity};
+  }
+  // What becomes of `motion` where the solid holds it and contacts have made `now` of what they have seen.
   RINGLET_KERNEL Motion<T> after(const Motion<T>& motion, const Motion<T>& now, T& load) const {
-    if (!held() || height(now.place) > kLifted) return now;
-    if (dot(now.velocity - touch.velocity, vector_of(plane)) > kLeaving) return now;
     const Motion<T> before = seen(motion);
-    const Vector3<T> n = vector_of(plane), turned = now.velocity - before.velocity,
-                     moved = now.place - before.place;
-    const T pressed = max(T(0), T(0) - dot(turned, n));
+    const Vector3<T> n = vector_of(plane), moved = now.place - before.place,
+                     turned = now.velocity - before.velocity;
+    const T lifted = dot(moved, n), sent_off = dot(turned, n), pressed = max(T(0), -sent_off);
+    const Vector3<T> moves = fma(max(T(0), -lifted), n, moved), turns = fma(pressed, n, turned);
+    if (lifted > kLifted || sent_off > kLeaving) {
+      load = T(0);
+      return {before.place + moves, before.velocity + turns};
+    }
     load += pressed;
-    return {motion.place + fma(max(T(0), T(0) - dot(moved, n)), n, moved),
-            motion.velocity + fma(pressed, n, turned)};
+    return {motion.place + moves, motion.velocity + turns};
   }
 
  private:
@@ -62,12 +67,12 @@ struct HeldParticle {
   }
 };
 
-// The response of the places s of segments that are pushed along `along`. `plane`: of each particle;
-// `free`: the segments' response if nothing held them, as extra.
+// The response of the places s of segments that are pushed along `along`. `held`: the normal of the plane
+// that each particle lies in, or 0; `free`: the segments' response if nothing held them, as extra.
 template <class R>
-RINGLET_KERNEL R held_response(const Place<Scalar<R>>* plane, const std::int32_t* segments, R s,
+RINGLET_KERNEL R held_response(const Place<Scalar<R>>* held, const std::int32_t* segments, R s,
                                const GatheredSegment<R>& free, Vector3<R> along) {
-  const Segment<R> normal = gather_segment<R>(plane, segments).places;
+  const Segment<R> normal = gather_segment<R>(held, segments).places;
   const auto left = [&](Vector3<R> n) {
     const R into = min(R(0), dot(along, n));
     return sqrt(max(R(0), R(1) - into * into));

@@ -161,8 +161,9 @@ RINGLET_FUNCTION Entry<T> hidden_entry(const StrandContact<T>& contact, Vector3<
   return suspect ? find_entry(contact, p, way, distance, inside) : Entry<T>{};
 }
 
-// The velocity and push-out stages for one particle; true where it touched. `touch` comes with the load on
-// it; `clearance` becomes how far outside the solid the particle is at least [m].
+// The velocity and push-out stages for one particle; true where it touched. `touch` comes as it last was,
+// with its load, which is felt on the same side of the same solid; `clearance` becomes how far outside the
+// solid the particle is at least [m].
 template <class T>
 RINGLET_FUNCTION bool collide_particle(const StrandContact<T>& contact, Vector3<T>& x, Vector3<T>& v,
                                        SurfaceTouch<T>& touch, T& clearance, LaneFigures<T>& figures) {
@@ -172,8 +173,9 @@ RINGLET_FUNCTION bool collide_particle(const StrandContact<T>& contact, Vector3<
   if (entry.found) at = contact.sample(entry.x);
   if (!at.exact || !(entry.found || at.distance < T(0))) return false;
   clearance = T(0);
-  const T load = touch.load;
-  touch = contact.touch(at), touch.load = load;
+  const SurfaceTouch<T> last = touch;
+  touch = contact.touch(at);
+  if (last.home == touch.home && dot(last.normal, touch.normal) > T(0)) touch.load = last.load;
   const Vector3<T> changed = touch.respond(v);
   if (entry.found)
     x = entry.x + entry.left * contact.step * (changed - touch.velocity);

@@ -160,8 +160,7 @@ struct ContactLane {
       for (int i = first(); i < count; ++i) {
         go_to(contact, i);
         Vector3<T> x = position(i), v = pack.get(pack.velocity, i, in_pack);
-        SurfaceTouch<T> touch;
-        touch.load = load(i);
+        SurfaceTouch<T> touch = last_touch(i);
         if (!collide_particle(contact, x, v, touch, clearance(i), figures)) continue;
         figures.touched = true;
         pack.set(pack.position, i, in_pack, x), pack.set(pack.velocity, i, in_pack, v);
@@ -212,9 +211,15 @@ struct ContactLane {
  private:
   RINGLET_FUNCTION T& clearance(int i) const { return pack.clearance[i * pack.stride + in_pack]; }
   RINGLET_FUNCTION Vector3<T> position(int i) const { return pack.get(pack.position, i, in_pack); }
-  RINGLET_FUNCTION T load(int i) const {
+  RINGLET_FUNCTION SurfaceTouch<T> last_touch(int i) const {
+    if (!step.touches) return {};
     const std::int64_t row = step.batches.row[batch] + i;
-    return step.touches ? step.touches[(row * kTouchReals + kTouchLoad) * kLanes + lane] : T(0);
+    const T* touch = step.touches + row * kTouchReals * kLanes + lane;
+    return {{touch[0], touch[kLanes], touch[2 * kLanes]},
+            {},
+            T(0),
+            touch[kTouchHome * kLanes],
+            touch[kTouchLoad * kLanes]};
   }
 
   // Out of the solid, without a change of the particle's own velocity; notes the touch.

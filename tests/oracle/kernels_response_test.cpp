@@ -103,7 +103,9 @@ TYPED_TEST(KernelResponse, TellsWhatItTouched) {
     StrandRun<TypeParam> run({oracle::make_strand(rest, {})},
                              {RootPose{oracle::Mat3::Identity(), {0, 0.005, 0}}}, false);
     const auto& layout = run.model.layout;
-    run.state.touches.assign(layout.rows() * kernels::kTouchReals * kernels::kLanes, T(0));
+    run.state.touches.assign(layout.rows() * kernels::kTouchReals * kernels::kLanes, T(7));
+    for (int i = 0; i < 3; ++i)
+      run.state.touches[layout.at(0, i, kernels::kTouchReals, kernels::kTouchLoad)] = T(0);
     run.home = home ? 0 : -1;
     oracle::State state = run.get(0);
     state.velocity.col(0) = Vector3d(0.1, 0.2, -0.3);
@@ -131,6 +133,7 @@ TYPED_TEST(KernelResponse, FeelsTheLoad) {
                              {RootPose{oracle::Mat3::Identity(), {0, 0.004, 0}}}, false);
     const auto& layout = run.model.layout;
     run.state.touches.assign(layout.rows() * kernels::kTouchReals * kernels::kLanes, T(0));
+    run.state.touches[layout.at(0, 1, kernels::kTouchReals, kernels::kTouchNormal + 1)] = T(1);
     run.state.touches[layout.at(0, 1, kernels::kTouchReals, kernels::kTouchLoad)] = T(load);
     oracle::State state = run.get(0);
     state.velocity.col(1) = Vector3d(3, -2, 0);

@@ -168,6 +168,7 @@ TEST(Solids, BearHairThatLiesOnHair) {
       SCOPED_TRACE(fmt::format("{} hairs, contacts each {}", hairs, cadence));
       Scenario scenario = among("hair_on_hair_on_a_floor", solids({solid("floor", {{0, Vec3(0, -0.05, 0)}})}),
                                 {{"floor", Vec3(0.3, 0.02, 0.3)}}, 0, 0, true);
+      scenario.machine = hairs % 4 == 0 ? Machine::kFloat : Machine::kDouble;
       scenario.hair = ring(hairs), scenario.seconds = 4;
       scenario.set.emplace_back("/model/preload=false");  // or it would not fall
       scenario.set.emplace_back(fmt::format(
@@ -187,7 +188,7 @@ TEST(Solids, BearHairThatLiesOnHair) {
       crossings.add(lying, 2 * kRadius);
       fmt::print("{} hairs, contacts each {}: moved by {:.2g} mm in a second, at {:.2g} m/s\n", hairs,
                  cadence, 1e3 * moved, after.last_speed);
-      EXPECT_LT(moved, 0.001);
+      EXPECT_LT(moved, 0.002);
       EXPECT_LT(after.last_speed, 2 * 9.81 * kStep);
     }
     fmt::print("contacts each {}: of {} crossings {} upside down, {} deep\n", cadence, crossings.all,

@@ -121,6 +121,32 @@ TYPED_TEST(HeldHair, IsStruckOffTheSurface) {
   }
 }
 
+// Between one that lifts it and one that strikes it from above: what solids hold makes no energy.
+TYPED_TEST(HeldHair, BetweenTwoMakesNoEnergy) {
+  const auto across = [&](double height, double share) {
+    return this->strand(Vec3(0.02 * (share - 0.5), height, 0), Vec3::UnitZ());
+  };
+  for (const double share : {0.15, 0.3, 0.5}) {
+    typename TestFixture::Run run({across(-2 * kRadius + 1e-4, 0.5),
+                                   this->strand(Vec3::Zero(), Vec3::UnitX()), across(2 * kRadius, share)},
+                                  kRadius, 1);
+    this->fly(run, 1, -kFall * this->kUp), this->hold(run, 1, this->kUp);
+    for (const int i : {1, 2}) run.set_velocity(2, i, -0.5 * this->kUp);
+    const auto energy = [&] {
+      double sum = 0;
+      for (const std::size_t strand : {0, 1, 2})
+        for (const int i : {1, 2}) sum += 0.5 * run.velocity(strand, i).squaredNorm();
+      return sum;
+    };
+    run.contacts->begin(run.contact_step());
+    for (int pass = 0; pass < 4; ++pass) {
+      const double before = energy();
+      ASSERT_GE(run.contacts->pass(run.contact_step()), 1);
+      EXPECT_LE(energy(), before * (1 + 1e-6)) << share << " " << pass;
+    }
+  }
+}
+
 TYPED_TEST(HeldHair, OfTwoSolidsThatPressItTogetherStaysToThem) {
   auto run = this->crossed(0.5 * this->kUp);
   this->fly(run, 0, -kFall * this->kUp), this->fly(run, 1, kFall * this->kUp);

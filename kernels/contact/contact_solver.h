@@ -123,15 +123,18 @@ class ContactSolver : public HairContacts<Scalar<R>> {
 
   // Where a strand has its values in the state's arrays.
   struct StrandRows {
-    std::int64_t values;  // of three components: kLanes apart, its particles 3 kLanes
-    std::int64_t scalars;
-    std::int64_t root;
+    std::int64_t row;  // of its first particle
+    std::int32_t lane;
+    std::int64_t root;  // its three components are kLanes apart
 
     RINGLET_KERNEL StrandRows(const HairContactStep<T>& step, std::int32_t s) {
-      const std::int32_t batch = step.order[s] / kLanes, lane = step.order[s] % kLanes;
-      const std::int64_t row = step.batches.row[batch];
-      values = row * 3 * kLanes + lane, scalars = row * kLanes + lane;
+      const std::int32_t batch = step.order[s] / kLanes;
+      row = step.batches.row[batch], lane = step.order[s] % kLanes;
       root = static_cast<std::int64_t>(batch) * 3 * kLanes + lane;
+    }
+    // The first of a particle's so many values, which are kLanes apart.
+    RINGLET_KERNEL std::int64_t at(std::int32_t particle, int values) const {
+      return (row + particle) * values * kLanes + lane;
     }
   };
 
@@ -146,40 +149,43 @@ class ContactSolver : public HairContacts<Scalar<R>> {
     return {values[0], values[kLanes], values[2 * kLanes]};
   }
 
-  void lay_out_start(const HairContactStep<T>& step) {
-    start_.resize(particles_);
-    Place<T>* start = start_.data();
+  // Calls visit(particle p, where its strand's values are, root point, its number in the strand).
+  template <class Visit>
+  void for_particles(const char* name, const HairContactStep<T>& step, const double* root_points,
+                     const Visit& visit) {
     const std::int32_t* first = first_.data();
     backend_.parallel_for(
-        "lay out start", step.strands,
+        name, step.strands,
         [=] RINGLET_LAMBDA(std::int32_t s) {
           const StrandRows rows(step, s);
-          const Vector3<T> root = root_of(step, rows, step.start_root_points);
-          std::int64_t at = rows.values;
-          for (std::int32_t p = first[s]; p < first[s + 1]; ++p, at += 3 * kLanes) {
-            const Vector3<T> then = root + value_at(step.start + at);
-            start[p] = {then.x, then.y, then.z, p - first[s] < step.clamped ? T(0) : T(1)};
-          }
+          const Vector3<T> root = root_of(step, rows, root_points);
+          for (std::int32_t p = first[s], i = 0; p < first[s + 1]; ++p, ++i) visit(p, rows, root, i);
         },
         kStrandChunk);
   }
 
-  // What a particle moves as: `row` of the step's arrays of three components.
-  RINGLET_KERNEL static Motion<T> motion_of(const HairContactStep<T>& step, Vector3<T> root,
-                                            std::int64_t row) {
-    return {root + value_at(step.state.position + row), value_at(step.state.velocity + row)};
+  void lay_out_start(const HairContactStep<T>& step) {
+    start_.resize(particles_);
+    for_particles("lay out start", step, step.start_root_points,
+                  [=, start = start_.data()] RINGLET_LAMBDA(std::int32_t p, const StrandRows& rows,
+                                                            Vector3<T> root, std::int32_t i) {
+                    const Vector3<T> then = root + value_at(step.start + rows.at(i, 3));
+                    start[p] = {then.x, then.y, then.z, i < step.clamped ? T(0) : T(1)};
+                  });
   }
-  RINGLET_KERNEL static T* touch_at(const HairContactStep<T>& step, std::int64_t row) {
-    const std::int64_t lane = row % kLanes;
-    return step.touches + (row - lane) / 3 * kTouchReals + lane;
+
+  RINGLET_KERNEL static Motion<T> motion_of(const HairContactStep<T>& step, const StrandRows& rows,
+                                            Vector3<T> root, std::int32_t i) {
+    const std::int64_t at = rows.at(i, 3);
+    return {root + value_at(step.state.position + at), value_at(step.state.velocity + at)};
   }
   // The head has gone on with the roots, other solids as they went.
   RINGLET_KERNEL static HeldParticle<T> held_particle(const HairContactStep<T>& step, const StrandRows& rows,
-                                                      std::int64_t row, const Place<T>& plane) {
-    const T* touch = touch_at(step, row);
+                                                      std::int32_t i, const Place<T>& plane) {
+    const T* touch = step.touches + rows.at(i, kTouchReals);
     const T home = touch[kTouchHome * kLanes];
     const Vector3<T> velocity =
-        fma(home, value_at(step.state.velocity + rows.values), value_at(touch + kTouchVelocity * kLanes));
+        fma(home, value_at(step.state.velocity + rows.at(0, 3)), value_at(touch + kTouchVelocity * kLanes));
     return {{value_at(touch), velocity, touch[kTouchFriction * kLanes], home, touch[kTouchLoad * kLanes]},
             plane,
             step.step};
@@ -189,47 +195,32 @@ class ContactSolver : public HairContacts<Scalar<R>> {
   void find_held(const HairContactStep<T>& step) {
     if (!step.touches) return;
     plane_.resize(particles_), held_.resize(particles_);
-    Place<T>* plane = plane_.data();
-    const std::int32_t* first = first_.data();
-    backend_.parallel_for(
-        "find held", step.strands,
-        [=] RINGLET_LAMBDA(std::int32_t s) {
-          const StrandRows rows(step, s);
-          const Vector3<T> root = root_of(step, rows, step.root_points);
-          std::int64_t at = rows.values;
-          for (std::int32_t p = first[s]; p < first[s + 1]; ++p, at += 3 * kLanes)
-            plane[p] = held_particle(step, rows, at, {}).plane_of(motion_of(step, root, at));
-        },
-        kStrandChunk);
+    for_particles("find held", step, step.root_points,
+                  [=, plane = plane_.data()] RINGLET_LAMBDA(std::int32_t p, const StrandRows& rows,
+                                                            Vector3<T> root, std::int32_t i) {
+                    plane[p] = held_particle(step, rows, i, {}).plane_of(motion_of(step, rows, root, i));
+                  });
   }
 
   // Places and velocities as the state now has them, or as the solids will leave it.
   enum class As { kTheyAre, kHeld };
   void lay_out_end(const HairContactStep<T>& step, As as = As::kHeld) {
     end_.resize(particles_), velocity_.resize(particles_);
-    Place<T>*end = end_.data(), *velocity = velocity_.data();
+    Place<T>*end = end_.data(), *velocity = velocity_.data(), *held = held_.data();
     const Place<T>* plane = as == As::kHeld && step.touches ? plane_.data() : nullptr;
-    Place<T>* held = held_.data();
-    const std::int32_t* first = first_.data();
-    backend_.parallel_for(
-        "lay out end", step.strands,
-        [=] RINGLET_LAMBDA(std::int32_t s) {
-          const StrandRows rows(step, s);
-          const Vector3<T> root = root_of(step, rows, step.root_points);
-          std::int64_t at = rows.values, scalar = rows.scalars;
-          for (std::int32_t p = first[s]; p < first[s + 1]; ++p, at += 3 * kLanes, scalar += kLanes) {
-            Motion<T> now = motion_of(step, root, at);
-            if (plane) {
-              const HeldParticle<T> particle = held_particle(step, rows, at, plane[p]);
-              const bool holds = particle.holds(now);
-              held[p] = holds ? plane[p] : Place<T>{};
-              if (holds) now = particle.seen(now);
-            }
-            end[p] = {now.place.x, now.place.y, now.place.z, step.radius[scalar]};
-            velocity[p] = {now.velocity.x, now.velocity.y, now.velocity.z, T(0)};
+    for_particles(
+        "lay out end", step, step.root_points,
+        [=] RINGLET_LAMBDA(std::int32_t p, const StrandRows& rows, Vector3<T> root, std::int32_t i) {
+          Motion<T> now = motion_of(step, rows, root, i);
+          if (plane) {
+            const HeldParticle<T> particle = held_particle(step, rows, i, plane[p]);
+            const bool holds = particle.holds(now);
+            held[p] = holds ? plane[p] : Place<T>{};
+            if (holds) now = particle.seen(now);
           }
-        },
-        kStrandChunk);
+          end[p] = {now.place.x, now.place.y, now.place.z, step.radius[rows.at(i, 1)]};
+          velocity[p] = {now.velocity.x, now.velocity.y, now.velocity.z, T(0)};
+        });
   }
 
   // Which pairs each segment has.
@@ -300,13 +291,13 @@ class ContactSolver : public HairContacts<Scalar<R>> {
           if (kappa[s] < 0) return;
           const StrandRows rows(step, s);
           const Vector3<T> root = root_of(step, rows, step.root_points);
-          std::int64_t at = rows.values + step.clamped * 3 * kLanes;
-          for (std::int32_t p = first[s] + step.clamped; p < first[s + 1]; ++p, at += 3 * kLanes) {
-            const Motion<T> was = motion_of(step, root, at);
+          for (std::int32_t i = step.clamped, p = first[s] + i; p < first[s + 1]; ++p, ++i) {
+            const Motion<T> was = motion_of(step, rows, root, i);
             Motion<T> now{vector_of(end[p]), vector_of(velocity[p])};
             if (held && dot(vector_of(held[p]), vector_of(held[p])) > T(0))
-              now = held_particle(step, rows, at, held[p])
-                        .after(was, now, touch_at(step, at)[kTouchLoad * kLanes]);
+              now = held_particle(step, rows, i, held[p])
+                        .after(was, now, step.touches[rows.at(i, kTouchReals) + kTouchLoad * kLanes]);
+            const std::int64_t at = rows.at(i, 3);
             T *x = step.state.position + at, *v = step.state.velocity + at;
             const Vector3<T> moved = now.place - was.place;
             x[0] += moved.x, x[kLanes] += moved.y, x[2 * kLanes] += moved.z;

@@ -121,7 +121,6 @@ class Strands final : public CudaStrands {
     stream_.parallel_for("shelter step", threads(), ShelterStepThread{step});
   }
   void contact_step(const ContactParameters& p) override {
-    if (p.touches && touches_.size() == 0) touches_.resize(rows_ * kTouchReals * kLanes), clear(touches_);
     const ContactStep<float> step{batches(),
                                   state(),
                                   root_points_.data(),
@@ -138,7 +137,7 @@ class Strands final : public CudaStrands {
                                   p.strain_limit,
                                   p.speed_limit,
                                   p.skipped_substeps,
-                                  p.touches ? touches_.data() : nullptr};
+                                  touches_.size() > 0 ? touches_.data() : nullptr};
     stream_.parallel_for("contact step", threads(), ContactStepThread{step, scratch()});
   }
 

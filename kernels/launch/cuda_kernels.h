@@ -57,7 +57,6 @@ struct ContactParameters {
   float strain_limit, speed_limit;  // [-], [m/s]; see ContactStep
   std::int32_t skipped_substeps;
   std::int32_t home;  // see ContactStep
-  bool touches;       // whether they are asked for
 };
 
 // The host's arrays of a state (StrandState). One that the run does without is empty; which ones are there
@@ -99,7 +98,7 @@ class CudaStrands {
   // pointers change.
   virtual void upload_solids(std::span<const SolidView> solids, std::int64_t interval) = 0;
   virtual void contact_step(const ContactParameters& parameters) = 0;
-  // ContactStep::touches, of which the step reads the loads. Until called there are none.
+  // ContactStep::touches, for the next step: from the first call on it tells them.
   virtual void upload_touches(std::span<const float> touches) = 0;
 
   virtual void length_step(const LengthStep<float>& step) = 0;  // pointers as strand_step's
@@ -112,7 +111,7 @@ class CudaStrands {
   virtual std::size_t grid_bytes() const = 0;  // of what `bytes` counts
 
   // Of the last step of each kind: [batches][kFigures], [batches][kContactFigures],
-  // [batches][kLengthFigures], and ContactStep::touches where they were asked for; an empty span is left out.
+  // [batches][kLengthFigures], and ContactStep::touches; an empty span is left out.
   virtual void download_figures(std::span<float> strands, std::span<float> contacts,
                                 std::span<float> lengths = {}, std::span<float> touches = {}) = 0;
 

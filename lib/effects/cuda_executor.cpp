@@ -97,7 +97,7 @@ class CudaExecutor : public Executor<float> {
       if (step.touches) strands_->upload_touches(touches);
       strands_->contact_step({step.step, step.clamped, step.rounds, step.length_iterations,
                               step.length_tolerance, step.strain_limit, step.speed_limit,
-                              step.skipped_substeps, step.home, step.touches != nullptr});
+                              step.skipped_substeps, step.home});
       strands_->download_figures({}, {step.figures, lanes_ * kernels::kContactFigures}, {}, touches);
     });
   }

@@ -155,6 +155,20 @@ def test_a_cut_run_resumes_to_the_same_bytes(program, scene, tmp_path, effects, 
     assert frame_bytes(tmp_path / "cut") == frame_bytes(tmp_path / "whole")
 
 
+def test_a_checkpoint_with_touches_that_are_no_numbers_is_refused(program, scene, tmp_path):
+    options = hair_hair(EACH_SUBSTEP)
+    out = finish(program, scene, tmp_path / "out", *options, "--frames", "1-2")
+    before = frame_bytes(out)
+    with h5py.File(out / "tiny.state.h5", "r+") as state:
+        touches = state["state/touches"]
+        broken = np.frombuffer(touches[:].tobytes(), np.float32).copy()
+        broken[0] = np.nan
+        touches[:] = np.frombuffer(broken.tobytes(), touches.dtype).reshape(touches.shape)
+    result = run(program, scene, out, "--backend", "cpu", *options, "--resume")
+    assert result.returncode == 3 and "`touches`" in result.stderr and "--resume" in result.stderr, result.stderr
+    assert frame_bytes(out) == before
+
+
 def test_order_of_strands_changes_no_byte(program, scene, whole, tmp_path):
     order = np.random.default_rng(7).permutation(STRANDS)
     permuted = write_scene(tmp_path, groom=data_bytes(strands()[order]))

@@ -149,7 +149,7 @@ class Solids {
 
 TEST_F(Cuda, ContactsAgree) {
   const StrandParameters<float> parameters = default_parameters();
-  const ContactParameters contact{parameters.step, 1, 4, 3, 1e-4f, 10, 1000, 0, 0, true};
+  const ContactParameters contact{parameters.step, 1, 4, 3, 1e-4f, 10, 1000, 0, 0};
   HostGroom host(helices(100));
   host.skin[3] = kIgnoresHome;
   host.state.touches.assign(host.model.layout.rows() * kTouchReals * kLanes, 0.0f);

@@ -110,10 +110,11 @@ void Grooming<T>::write(std::size_t strand, const groom::EditedStrand& edited,
     if (k >= before.velocity.size() || edited.velocity[k] != before.velocity[k])
       put(state_.velocity, i, edited.velocity[k]);
   }
-  // Nor does what pressed it where it was.
-  for (int i = 0; !state_.touches.empty() && i < room; ++i)
-    for (int k = 0; k < kernels::kTouchReals; ++k)
-      state_.touches[model_.layout.at(strand, i, kernels::kTouchReals, k)] = T(0);
+  // What pressed it where it was does so no more.
+  if (!state_.touches.empty())
+    for (int i = 0; i < room; ++i)
+      for (int k = 0; k < kernels::kTouchReals; ++k)
+        state_.touches[model_.layout.at(strand, i, kernels::kTouchReals, k)] = T(0);
   // What hair has suffered it keeps, whatever its new shape; particles that are new have suffered nothing and
   // stand free.
   for (int i = 0; i < room; ++i) {

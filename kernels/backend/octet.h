@@ -22,6 +22,7 @@ struct Octet {
   };
 #else
   typedef T Vector __attribute__((vector_size(8 * sizeof(T))));
+  typedef T Unaligned __attribute__((vector_size(8 * sizeof(T)), aligned(sizeof(T)), may_alias));
 #endif
   Vector v;
 
@@ -37,6 +38,25 @@ struct Octet {
   // `p` aligned to eight values
   RINGLET_KERNEL static Octet load(const T* p) { return *reinterpret_cast<const Octet*>(p); }
   RINGLET_KERNEL void store(T* p) const { *reinterpret_cast<Octet*>(p) = *this; }
+  // `p` wherever it is
+  static RINGLET_KERNEL Octet load_unaligned(const T* p) {
+    Octet a;
+#if defined(__CUDACC__)
+    RINGLET_UNROLL
+    for (int k = 0; k < 8; ++k) a.v[k] = p[k];
+#else
+    a.v = *reinterpret_cast<const Unaligned*>(p);
+#endif
+    return a;
+  }
+  RINGLET_KERNEL void store_unaligned(T* p) const {
+#if defined(__CUDACC__)
+    RINGLET_UNROLL
+    for (int k = 0; k < 8; ++k) p[k] = v[k];
+#else
+    *reinterpret_cast<Unaligned*>(p) = v;
+#endif
+  }
 
   friend RINGLET_KERNEL Octet operator+(const Octet& a, const Octet& b) {
     return each(a, b, [](auto x, auto y) { return x + y; });
@@ -49,6 +69,12 @@ struct Octet {
   }
   friend RINGLET_KERNEL Octet operator&(const Octet& a, const Octet& b) {
     return each(a, b, [](auto x, auto y) { return x & y; });
+  }
+  friend RINGLET_KERNEL Octet operator|(const Octet& a, const Octet& b) {
+    return each(a, b, [](auto x, auto y) { return x | y; });
+  }
+  friend RINGLET_KERNEL Octet operator^(const Octet& a, const Octet& b) {
+    return each(a, b, [](auto x, auto y) { return x ^ y; });
   }
   friend RINGLET_KERNEL Octet operator>>(const Octet& a, int bits) {
     return each(a, a, [bits](auto x, auto) { return x >> bits; });
@@ -68,44 +94,43 @@ struct Octet {
   }
 };
 
+// Lanes of `a` (0 to 7) and `b` (8 to 15) by number.
+template <int... kFrom, class T>
+RINGLET_KERNEL Octet<T> shuffled(const Octet<T>& a, const Octet<T>& b) {
+  static_assert(sizeof...(kFrom) == 8);
+  Octet<T> result;
+#if defined(__CUDACC__)
+  int k = 0;
+  ((result.v[k++] = kFrom < 8 ? a.v[kFrom & 7] : b.v[kFrom & 7]), ...);
+#else  // one instruction or two: lane by lane, GCC takes one for each
+  result.v = __builtin_shufflevector(a.v, b.v, kFrom...);
+#endif
+  return result;
+}
+
 // `a` in the lanes whose bits are set, `b` in the others.
 template <int kLanesOfA, class T>
 RINGLET_KERNEL Octet<T> choose(const Octet<T>& a, const Octet<T>& b) {
-  Octet<T> result;
-#if defined(__CUDACC__)
-  RINGLET_UNROLL
-  for (int k = 0; k < 8; ++k) result.v[k] = kLanesOfA >> k & 1 ? a.v[k] : b.v[k];
-#else  // one instruction: lane by lane, GCC takes one for each
   constexpr auto from = [](int k) { return kLanesOfA >> k & 1 ? k : k + 8; };
-  result.v = __builtin_shufflevector(a.v, b.v, from(0), from(1), from(2), from(3), from(4), from(5), from(6),
-                                     from(7));
-#endif
-  return result;
+  return shuffled<from(0), from(1), from(2), from(3), from(4), from(5), from(6), from(7)>(a, b);
 }
 
 // Lane k in all lanes.
 template <int k, class T>
 RINGLET_KERNEL Octet<T> spread(const Octet<T>& a) {
-#if defined(__CUDACC__)
-  return Octet<T>(a.v[k]);
-#else
-  Octet<T> result;
-  result.v = __builtin_shufflevector(a.v, a.v, k, k, k, k, k, k, k, k);
-  return result;
-#endif
+  return shuffled<k, k, k, k, k, k, k, k>(a, a);
 }
 
-// max(a, 0)
-template <class T>
-RINGLET_KERNEL Octet<T> positive(const Octet<T>& a) {
-  Octet<T> result;
-#if defined(__CUDACC__)
-  RINGLET_UNROLL
-  for (int k = 0; k < 8; ++k) result.v[k] = max(a.v[k], T(0));
+// The lanes that are not 0, a bit for each.
+RINGLET_KERNEL std::uint32_t not_zero(const Octet<std::int32_t>& a) {
+#if defined(__AVX2__) && !defined(__CUDACC__)
+  const __m256i zero = _mm256_cmpeq_epi32(reinterpret_cast<__m256i>(a.v), _mm256_setzero_si256());
+  return ~static_cast<std::uint32_t>(_mm256_movemask_ps(_mm256_castsi256_ps(zero))) & 0xffu;
 #else
-  result.v = a.v > T(0) ? a.v : Octet<T>(T(0)).v;
+  std::uint32_t bits = 0;
+  for (int k = 0; k < 8; ++k) bits |= a.v[k] != 0 ? 1u << k : 0u;
+  return bits;
 #endif
-  return result;
 }
 
 // Towards zero; what does not fit is anything.

@@ -64,25 +64,6 @@ RINGLET_FUNCTION Opening<T> find_opening(const GridData<T>& g, const double* pla
 }
 
 template <class T>
-RINGLET_FUNCTION void find_openings(const GridData<T>& g, std::int32_t tile, int cell) {
-  std::int32_t corner[3];
-  tile_corner(g, tile, corner);
-  T* to = g.opening + (static_cast<std::int64_t>(g.wall[tile]) * kTileCells + cell) * kWallValues;
-  const std::int64_t node = static_cast<std::int64_t>(tile) * kTileCells + cell;
-  const bool above = fluid_cell(g, node) >= 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    const bool below = fluid_cell(g, next_node(g, node, axis, -1)) >= 0;
-    to[axis] = T(1), to[3 + axis] = T(0);
-    if (!above && !below) continue;
-    double place[3];
-    for (int c = 0; c < 3; ++c)
-      place[c] = kTileEdge * g.low[c] + corner[c] + coordinate_in_tile(cell, c) + (c == axis ? 0.0 : 0.5);
-    const Opening<T> opening = find_opening(g, place, axis, above, below);
-    to[axis] = opening.share, to[3 + axis] = opening.velocity;
-  }
-}
-
-template <class T>
 RINGLET_FUNCTION std::uint64_t fluid_cells(const GridData<T>& g, std::int32_t tile) {
   std::uint64_t mask = 0;
   for (int cell = 0; cell < kTileCells; ++cell) {
@@ -118,6 +99,40 @@ RINGLET_FUNCTION std::uint64_t fluid_below(const GridData<T>& g, std::int32_t ti
 template <class T>
 RINGLET_FUNCTION std::uint64_t fluid_faces(const GridData<T>& g, std::int32_t tile, int axis) {
   return g.fluid[tile] | fluid_below(g, tile, axis);
+}
+
+// Whether 2 x 2 x 2 cells of a tile have such faces.
+template <class T>
+RINGLET_FUNCTION bool part_has_fluid_faces(const GridData<T>& g, std::int64_t part) {
+  const std::int32_t tile = static_cast<std::int32_t>(part / kTileParts);
+  constexpr std::uint64_t kCells = (1 << kPartCells) - 1;
+  std::uint64_t faces = 0;
+  for (int axis = 0; axis < 3; ++axis) faces |= fluid_faces(g, tile, axis);
+  return (faces >> (part % kTileParts * kPartCells) & kCells) != 0;
+}
+
+// Of the faces of 2 x 2 x 2 cells.
+template <class T>
+RINGLET_FUNCTION void find_openings(const GridData<T>& g, std::int64_t part) {
+  const std::int32_t tile = static_cast<std::int32_t>(part / kTileParts);
+  const Octet<std::int32_t> corner = tile_corner(g, tile);
+  T* to = g.opening + static_cast<std::int64_t>(g.wall[part]) * kPartCells * kWallValues;
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::uint64_t below = fluid_below(g, tile, axis);
+    for (int n = 0; n < kPartCells; ++n) {
+      const int cell = static_cast<int>(part % kTileParts) * kPartCells + n;
+      const bool fluid_above = g.fluid[tile] >> cell & 1, fluid_beneath = below >> cell & 1;
+      Opening<T> opening{T(1), T(0)};
+      if (fluid_above || fluid_beneath) {
+        double place[3];
+        for (int c = 0; c < 3; ++c)
+          place[c] =
+              kTileEdge * g.low[c] + corner.v[c] + coordinate_in_tile(cell, c) + (c == axis ? 0.0 : 0.5);
+        opening = find_opening(g, place, axis, fluid_above, fluid_beneath);
+      }
+      to[n * kWallValues + axis] = opening.share, to[n * kWallValues + 3 + axis] = opening.velocity;
+    }
+  }
 }
 
 // Calls f(bit) for the bits that are set, from the lowest on.

@@ -97,7 +97,7 @@ class GridSolver final : public HairGrid<T> {
            given_back_.bytes() + tile_key_.bytes() + near_.bytes() + occupied_key_.bytes() +
            occupied_tile_.bytes() + tile_piece_.bytes() + flag_.bytes() + around_key_.bytes() +
            around_.bytes() + node_.bytes() + lightness_.bytes() + wall_.bytes() + opening_.bytes() +
-           wall_tile_.bytes() + fluid_.bytes() + first_cell_.bytes() + tile_density_.bytes() +
+           wall_part_.bytes() + fluid_.bytes() + first_cell_.bytes() + tile_density_.bytes() +
            tile_depth_.bytes();
   }
 
@@ -205,24 +205,20 @@ class GridSolver final : public HairGrid<T> {
 
   void cut_pieces(int bits) {
     std::int32_t* count = first_piece_.data();
-    backend_.parallel_for("grid: count pieces", data_.particles, [g = data_, count] RINGLET_LAMBDA(int i) {
-      std::int32_t pieces = 0;
-      for_each_piece(g, i, 0, [&](const Piece&, std::int32_t, std::int32_t, std::int32_t) { ++pieces; });
-      count[i] = pieces;
-    });
+    backend_.parallel_for("grid: count pieces", data_.particles,
+                          [g = data_, count] RINGLET_LAMBDA(int i) { count[i] = count_pieces(g, i); });
     const std::int32_t particles = data_.particles;
     backend_.parallel_for("grid: count pieces", 1, [=] RINGLET_LAMBDA(int) { count[particles] = 0; });
     data_.pieces = backend_.scan("grid: count pieces", first_piece_, particles + 1);
     piece_.resize(data_.pieces), piece_key_.resize(data_.pieces), piece_of_.resize(data_.pieces);
-    given_back_.resize(std::size_t{2 * kNodeValues} * data_.pieces);
+    given_back_.resize(std::size_t{2 * 8} * data_.pieces);
     data_.piece = piece_.data(), data_.given_back = given_back_.data();
     data_.piece_key = piece_key_.data(), data_.piece_of = piece_of_.data();
     backend_.parallel_for("grid: cut pieces", data_.particles, [g = data_] RINGLET_LAMBDA(int i) {
-      for_each_piece(g, i, g.first_piece[i],
-                     [&](const Piece& piece, std::int32_t x, std::int32_t y, std::int32_t z) {
-                       g.piece[piece.number] = piece, g.piece_key[piece.number] = key_of(x, y, z);
-                       g.piece_of[piece.number] = static_cast<std::uint32_t>(piece.number);
-                     });
+      for_each_piece(g, i, [&](const Piece& piece, std::int32_t x, std::int32_t y, std::int32_t z) {
+        g.piece[piece.number] = piece, g.piece_key[piece.number] = key_of(x, y, z);
+        g.piece_of[piece.number] = static_cast<std::uint32_t>(piece.number);
+      });
     });
     backend_.sort("grid: sort pieces", piece_key_, piece_of_, data_.pieces, bits);
     data_.piece_key = piece_key_.data(), data_.piece_of = piece_of_.data();
@@ -350,30 +346,28 @@ class GridSolver final : public HairGrid<T> {
   // ---- Cells
 
   void find_walls() {
-    wall_.resize(data_.tiles), flag_.resize(data_.tiles + 1);
+    const std::int32_t parts = data_.tiles * kTileParts;
+    wall_.resize(parts), flag_.resize(parts + 1);
     std::int32_t *number = flag_.data(), *wall = wall_.data();
     data_.wall = wall;
     backend_.parallel_for(
-        "grid: near walls", data_.tiles + 1,
-        [g = data_, number] RINGLET_LAMBDA(int tile) {
-          number[tile] = tile < g.tiles && has_fluid_faces(g, tile) && near_wall(g, tile) ? 1 : 0;
+        "grid: near walls", parts + 1,
+        [g = data_, number, parts] RINGLET_LAMBDA(int part) {
+          number[part] = part < parts && part_has_fluid_faces(g, part) && near_wall(g, part) ? 1 : 0;
         },
-        kTileChunk);
-    const std::int32_t walls = backend_.scan("grid: near walls", flag_, data_.tiles + 1);
-    wall_tile_.resize(walls), opening_.resize(static_cast<std::size_t>(walls) * kTileCells * kWallValues);
-    std::int32_t* tile_of = wall_tile_.data();
+        kTileChunk * kTileParts);
+    const std::int32_t walls = backend_.scan("grid: near walls", flag_, parts + 1);
+    wall_part_.resize(walls), opening_.resize(static_cast<std::size_t>(walls) * kPartCells * kWallValues);
+    std::int32_t* part_of = wall_part_.data();
     data_.opening = opening_.data();
-    backend_.parallel_for("grid: near walls", data_.tiles, [=] RINGLET_LAMBDA(int tile) {
-      const bool is_near = number[tile + 1] != number[tile];
-      wall[tile] = is_near ? number[tile] : -1;
-      if (is_near) tile_of[number[tile]] = tile;
+    backend_.parallel_for("grid: near walls", parts, [=] RINGLET_LAMBDA(int part) {
+      const bool is_near = number[part + 1] != number[part];
+      wall[part] = is_near ? number[part] : -1;
+      if (is_near) part_of[number[part]] = part;
     });
     backend_.parallel_for(
-        "grid: walls", walls * kTileCells,
-        [g = data_, tile_of] RINGLET_LAMBDA(int n) {
-          find_openings(g, tile_of[n / kTileCells], n % kTileCells);
-        },
-        kTileCells);
+        "grid: walls", walls, [g = data_, part_of] RINGLET_LAMBDA(int n) { find_openings(g, part_of[n]); },
+        kTileParts);
   }
 
   void find_fluid() {
@@ -490,12 +484,11 @@ class GridSolver final : public HairGrid<T> {
   }
 
   void give_back_all(bool moved) {
+    data_.moved = moved;
     backend_.parallel_for(
         "grid: gather", data_.occupied, [g = data_] RINGLET_LAMBDA(int t) { gather_tile(g, t); }, kTileChunk);
-    const T cell = moved ? static_cast<T>(data_.step.axes.cell) : T(0);
     backend_.parallel_for(
-        "grid: give back", data_.lanes, [g = data_, cell] RINGLET_LAMBDA(int s) { give_back(g, cell, s); },
-        256);
+        "grid: give back", data_.lanes, [g = data_] RINGLET_LAMBDA(int s) { give_back(g, s); }, 256);
   }
 
  private:
@@ -508,7 +501,7 @@ class GridSolver final : public HairGrid<T> {
   double most_rest_density_ = 1;
   Pressure<Backend, T> pressure_;
   Buffer<std::int32_t> first_particle_, first_sample_, first_piece_, near_, occupied_tile_, tile_piece_,
-      flag_, wall_, wall_tile_, first_cell_;
+      flag_, wall_, wall_part_, first_cell_;
   Buffer<unsigned char> ends_;
   Buffer<T> tile_density_, tile_depth_;
   Buffer<T> rest_density_, particle_, given_back_, node_, lightness_, opening_;

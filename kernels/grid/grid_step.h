@@ -83,8 +83,6 @@ inline namespace RINGLET_ISA {
 inline constexpr int kNodeValues = 8;
 inline constexpr int kDensity = 0, kTarget = 1, kFaceMass = 2;  // + 2 axis; the velocity follows
 
-inline constexpr int kHaloEdge = kTileEdge + 2, kHaloNodes = kHaloEdge * kHaloEdge * kHaloEdge;
-
 // Sums on nodes are of integers, so that no order of strands shows in them.
 template <class T>
 struct FixedPoint;
@@ -132,7 +130,8 @@ struct GridData {
   std::uint64_t* piece_key;  // [pieces] its tile's; sorted once there are tiles
   Piece* tile_pieces;        // [pieces] sorted by tile: what is read one after the other lies so
   std::uint32_t* piece_of;   // [pieces] sorted by tile
-  T* given_back;             // [pieces][2][kNodeValues] to the segment's first and second particle
+  bool moved;                // positions are corrected: pieces give them back too
+  T* given_back;             // [pieces][moved ? 2 : 1][8] what pieces give back (given_back_by)
   // Tiles, sorted by key
   std::int32_t low[3];     // tile coordinates of key 0
   std::int32_t extent[3];  // tiles along each axis
@@ -146,8 +145,8 @@ struct GridData {
   T* lightness;                       // [tiles][kTileCells][3] 1 / mass of the faces, 0: none to move
   alignas(64) T scale[kNodeValues];   // of the sums
   // Walls
-  std::int32_t* wall;  // [tiles] where its walls are, -1: no solid near
-  T* opening;          // [walls][kTileCells][6] open share of each face, velocity of the solid there
+  std::int32_t* wall;  // [tiles][kTileParts] where a part's walls are, -1: no solid near
+  T* opening;          // [walls][kPartCells][6] open share of each face, velocity of the solid there
   // Fluid cells, sorted by key
   std::uint64_t* fluid;      // [tiles] a bit for each fluid cell
   std::int32_t* first_cell;  // [tiles + 1]

@@ -35,13 +35,13 @@ template <class T>
 RINGLET_FUNCTION T depth_before(const GridData<T>& g, const TileShelter<T>& shelter, std::int32_t tile) {
   constexpr int kMostTiles = 1 << 11, kStride[3] = {1, 3, 9};
   if (!(shelter.per_tile > 0)) return T(0);
-  std::int32_t corner[3], at[3], step[3];
+  std::int32_t at[3], step[3];
   double next[3], each[3];  // how far it is to the side of the next tile along each axis, and between them
-  tile_corner(g, tile, corner);
+  const Octet<std::int32_t> corner = tile_corner(g, tile);
   for (int c = 0; c < 3; ++c) {
     step[c] = shelter.upwind[c] < 0 ? -1 : 1;
     const double along = step[c] * shelter.upwind[c];
-    at[c] = corner[c] / kTileEdge, each[c] = along > 1e-9 ? 1 / along : 1e9, next[c] = 0.5 * each[c];
+    at[c] = corner.v[c] / kTileEdge, each[c] = along > 1e-9 ? 1 / along : 1e9, next[c] = 0.5 * each[c];
   }
   double sum = 0, gone = 0;
   std::int32_t here = tile;

@@ -3,6 +3,7 @@
 #include "kernels/backend/octet.h"
 #include "kernels/backend/vector.h"
 #include "kernels/grid/grid_step.h"
+#include "kernels/grid/halo.h"
 #include "kernels/solid/level_set.h"
 
 namespace ringlet::kernels {
@@ -70,7 +71,8 @@ inline constexpr int kMomenta = 1 << 3 | 1 << 5 | 1 << 7;
 
 template <class T>
 struct Segment {
-  Octet<T> a, b;  // its particles in the grid's axes
+  Octet<T> a, b;       // its particles in the grid's axes
+  Octet<T> from, way;  // place of the first, and from it to the second, in both halves
   std::int32_t samples;
   T each;              // 1 / samples
   T share_a, share_b;  // of their masses, at full weight
@@ -78,6 +80,8 @@ struct Segment {
   RINGLET_KERNEL Segment(const GridData<T>& g, std::int32_t particle, std::int32_t n, std::int32_t ends)
       : a(Octet<T>::load(g.particle + static_cast<std::int64_t>(particle) * 8)),
         b(Octet<T>::load(g.particle + static_cast<std::int64_t>(particle) * 8 + 8)),
+        from(first_half(a)),
+        way(first_half(b - a)),
         samples(n),
         each(T(1) / static_cast<T>(n)) {
     // Half a particle's mass is on each side of it, all of it at the strand's ends.
@@ -91,122 +95,133 @@ struct Segment {
     return min(sqrt(square) * each, T(kMostSampleLength));
   }
   RINGLET_FUNCTION T parameter(std::int32_t sample) const { return (static_cast<T>(sample) + T(0.5)) * each; }
-  RINGLET_FUNCTION Octet<T> place(T t) const { return a + Octet<T>(t) * (b - a); }
+  RINGLET_FUNCTION Octet<T> place(T t) const { return from + Octet<T>(t) * way; }
 };
 
 // Where eight samples of a segment lie, from the one numbered `first` on.
 template <class T>
 struct SampleTiles {
-  alignas(32) std::int32_t x[8], y[8], z[8];  // of their tiles
-  alignas(32) std::int32_t nearest[8];        // tile about it, itself included, that the sample is nearest to
+  Octet<std::int32_t> x, y, z;          // their tiles
+  alignas(32) std::int32_t nearest[8];  // tile about it, itself included, that the sample is nearest to
 
   RINGLET_KERNEL SampleTiles(const Segment<T>& segment, std::int32_t first) {
     Octet<T> t;
     RINGLET_UNROLL
     for (int k = 0; k < 8; ++k) t.v[k] = segment.parameter(first + k);
-    const auto along = [&](const Octet<T>& a, const Octet<T>& way, std::int32_t* tile) {
+    const auto along = [&](const Octet<T>& a, const Octet<T>& way, Octet<std::int32_t>& tile) {
       const Octet<std::int32_t> at = truncated(a + t * way), within = at & Octet<std::int32_t>(kTileEdge - 1);
-      (at >> 2).store(tile);
+      tile = at >> 2;
       return (within + Octet<std::int32_t>(1)) >> 1;  // 0, 1 or 2: before the tile, in it, after it
     };
-    const Octet<T> a = segment.a, way = segment.b - a;
+    const Octet<T>&a = segment.from, &way = segment.way;
     const Octet<std::int32_t> near_x = along(spread<0>(a), spread<0>(way), x);
     const Octet<std::int32_t> near_y = along(spread<1>(a), spread<1>(way), y);
     const Octet<std::int32_t> near_z = along(spread<2>(a), spread<2>(way), z);
     const Octet<std::int32_t> three(3);
     (near_x + three * (near_y + three * near_z)).store(nearest);
   }
+  // The first `samples` of them that lie in another tile than the one before, a bit for each; the one before
+  // the first is the last of `before`.
+  RINGLET_KERNEL std::uint32_t starts(const SampleTiles& before, std::int32_t samples) const {
+    const auto other = [](const Octet<std::int32_t>& a, const Octet<std::int32_t>& b) {
+      return a ^ shuffled<7, 8, 9, 10, 11, 12, 13, 14>(b, a);
+    };
+    return not_zero(other(x, before.x) | other(y, before.y) | other(z, before.z)) & ((1u << samples) - 1);
+  }
 };
 
-// Calls visit(piece, tile's x, y, z) for each piece of a segment; `number`: of the first of them.
+// Calls visit(tiles, first, samples, starts) for each eight samples of a segment, or what is left of them:
+// `starts` has the bits of those that a piece begins with.
 template <class T, class Visit>
-RINGLET_FUNCTION void for_each_piece(const GridData<T>& g, std::int32_t i, std::int32_t number,
-                                     const Visit& visit) {
+RINGLET_FUNCTION void for_each_eight(const Segment<T>& segment, const Visit& visit) {
+  const auto samples = [&](std::int32_t first) {
+    const std::int32_t left = segment.samples - first;
+    return left < 8 ? left : 8;
+  };
+  SampleTiles<T> tiles(segment, 0);
+  visit(tiles, 0, samples(0), tiles.starts(tiles, samples(0)) | 1);
+  for (std::int32_t first = 8; first < segment.samples; first += 8) {
+    const SampleTiles<T> before = tiles;
+    tiles = SampleTiles<T>(segment, first);
+    visit(tiles, first, samples(first), tiles.starts(before, samples(first)));
+  }
+}
+
+template <class T>
+RINGLET_FUNCTION std::int32_t count_pieces(const GridData<T>& g, std::int32_t i) {
+  if (g.ends[i] & kLastOfStrand) return 0;
+  std::int32_t pieces = 0;
+  for_each_eight(Segment<T>(g, i, g.first_sample[i + 1] - g.first_sample[i], 0),
+                 [&](const SampleTiles<T>&, std::int32_t, std::int32_t, std::uint32_t starts) {
+                   pieces += ones(starts);
+                 });
+  return pieces;
+}
+
+// Calls visit(piece, tile's x, y, z) for each piece of a segment.
+template <class T, class Visit>
+RINGLET_FUNCTION void for_each_piece(const GridData<T>& g, std::int32_t i, const Visit& visit) {
   if (g.ends[i] & kLastOfStrand) return;
   const std::int32_t rest = g.first_sample[i], samples = g.first_sample[i + 1] - rest;
-  const Segment<T> segment(g, i, samples, 0);
-  Piece piece{i, number, 0, 0, samples, rest, (g.ends[i] & kFirstOfStrand) | (g.ends[i + 1] & kLastOfStrand),
+  Piece piece{i,
+              g.first_piece[i] - 1,
+              0,
+              0,
+              samples,
+              rest,
+              (g.ends[i] & kFirstOfStrand) | (g.ends[i + 1] & kLastOfStrand),
               0};
   std::int32_t x = 0, y = 0, z = 0;
-  for (std::int32_t first = 0; first < samples; first += 8) {
-    const SampleTiles<T> tiles(segment, first);
-    for (int k = 0; k < 8 && first + k < samples; ++k) {
-      const bool other = tiles.x[k] != x || tiles.y[k] != y || tiles.z[k] != z;
-      if (other && piece.end > 0) {
-        visit(piece, x, y, z);
-        ++piece.number, piece.first = piece.end, piece.rest = rest + piece.end, piece.reached = 0;
+  for_each_eight(Segment<T>(g, i, samples, 0), [&](const SampleTiles<T>& tiles, std::int32_t first,
+                                                   std::int32_t count, std::uint32_t starts) {
+    for (std::int32_t k = 0; k < count; ++k) {
+      if (starts >> k & 1) {
+        if (first + k > 0) visit(piece, x, y, z);
+        ++piece.number, piece.first = first + k, piece.rest = rest + first + k, piece.reached = 0;
+        x = tiles.x.v[k], y = tiles.y.v[k], z = tiles.z.v[k];
       }
-      x = tiles.x[k], y = tiles.y[k], z = tiles.z[k];
-      piece.reached |= 1u << tiles.nearest[k], ++piece.end;
+      piece.reached |= 1u << tiles.nearest[k], piece.end = first + k + 1;
     }
-  }
+  });
   visit(piece, x, y, z);
 }
 
-// ---- Weights: of the three cells about a place along each axis (the one it lies in is the middle one), for
-// values in the cells' middles and for those on their lower faces.
+// ---- Tiles
 
-// The lanes of a node's values that lie on the lower face of an axis.
-template <int kAxis>
-inline constexpr int kFaceLanes = 3 << (kFaceMass + 2 * kAxis);
-
-// The weights of a sample at the 27 nodes about it, for each of a node's values: x[i] y[j] z[k].
+// A tile's lowest corner, from the lowest tile's [cells], in both halves.
 template <class T>
-struct SampleWeights {
-  Octet<T> x[3], y[3], z[3];
-  int corner;  // the node below it on each axis, in the halo
-
-  // `place` in cells; `low`: the tile's corner.
-  RINGLET_KERNEL SampleWeights(const std::int32_t* low, const Octet<T>& place) {
-    const Octet<std::int32_t> at = truncated(place);
-    const Octet<T> within = place - to_real<T>(at);
-    corner = ((at.v[2] - low[2]) * kHaloEdge + (at.v[1] - low[1])) * kHaloEdge + (at.v[0] - low[0]);
-    set<kFaceLanes<0>>(x, spread<0>(within));
-    set<kFaceLanes<1>>(y, spread<1>(within));
-    set<kFaceLanes<2>>(z, spread<2>(within));
-  }
-  RINGLET_KERNEL int node(int j, int k) const { return corner + (k * kHaloEdge + j) * kHaloEdge; }
-  // The halo's rows along x that these are of, a bit for each.
-  RINGLET_KERNEL std::uint64_t rows() const {
-    constexpr std::uint64_t kThree = 7, kNine = kThree | kThree << kHaloEdge | kThree << 2 * kHaloEdge;
-    return kNine << (corner / kHaloEdge);
-  }
-
- private:
-  template <int kFace>
-  RINGLET_KERNEL static void set(Octet<T>* w, const Octet<T>& within) {
-    const Octet<T> zero(T(0)), beyond = within - choose<kFace>(zero, Octet<T>(T(0.5)));
-    w[0] = positive(zero - beyond), w[2] = positive(beyond);
-    w[1] = Octet<T>(T(1)) - w[0] - w[2];
-  }
-};
-
-// A tile's lowest corner, from the lowest tile's [cells].
-template <class T>
-RINGLET_FUNCTION void tile_corner(const GridData<T>& g, std::int32_t tile, std::int32_t* corner) {
+RINGLET_FUNCTION Octet<std::int32_t> tile_corner(const GridData<T>& g, std::int32_t tile) {
+  Octet<std::int32_t> corner(0);
   for (int c = 0; c < 3; ++c)
-    corner[c] = kTileEdge * static_cast<std::int32_t>(gather_bits(g.tile_key[tile] >> c));
+    corner.v[c] = corner.v[c + 4] = kTileEdge * static_cast<std::int32_t>(gather_bits(g.tile_key[tile] >> c));
+  return corner;
 }
 
 inline constexpr std::uint64_t kAllRows = (std::uint64_t{1} << kHaloEdge * kHaloEdge) - 1;
 
-// Calls visit(node of the halo, node of the grid) for those that exist of the rows along x whose bits are
-// set.
+// The grid's nodes that a row of the halo's along x are, -1: none.
+struct HaloRow {
+  std::int64_t node[kHaloEdge];
+};
+
+// Calls visit(y, z, row) for the halo's rows along x whose bits are set.
 template <class T, class Visit>
-RINGLET_FUNCTION void for_each_halo_node(const GridData<T>& g, std::int32_t tile, std::uint64_t rows,
-                                         const Visit& visit) {
+RINGLET_FUNCTION void for_each_halo_row(const GridData<T>& g, std::int32_t tile, std::uint64_t rows,
+                                        const Visit& visit) {
   const std::int32_t* near = g.near + static_cast<std::int64_t>(tile) * kAround;
   const auto side = [](int a) { return a == 0 ? 0 : a <= kTileEdge ? 1 : 2; };
-  for (int k = 0; k < kHaloEdge; ++k)
-    for (int j = 0; j < kHaloEdge; ++j) {
-      if (!(rows >> (k * kHaloEdge + j) & 1)) continue;
-      const std::int32_t* row = near + (side(k) * 3 + side(j)) * 3;
-      const int cells = cell_in_tile(0, (j - 1) & 3, (k - 1) & 3), halo = (k * kHaloEdge + j) * kHaloEdge;
+  for (int z = 0; z < kHaloEdge; ++z)
+    for (int y = 0; y < kHaloEdge; ++y) {
+      if (!(rows >> (z * kHaloEdge + y) & 1)) continue;
+      const std::int32_t* tiles = near + (side(z) * 3 + side(y)) * 3;
+      const int cells = cell_in_tile(0, (y - 1) & 3, (z - 1) & 3);
+      HaloRow row;
       RINGLET_UNROLL
-      for (int i = 0; i < kHaloEdge; ++i) {
-        const std::int64_t other = row[side(i)];
-        if (other >= 0) visit(halo + i, other * kTileCells + (cells | cell_in_tile((i - 1) & 3, 0, 0)));
+      for (int x = 0; x < kHaloEdge; ++x) {
+        const std::int64_t other = tiles[side(x)];
+        row.node[x] = other < 0 ? -1 : other * kTileCells + (cells | cell_in_tile((x - 1) & 3, 0, 0));
       }
+      visit(y, z, row);
     }
 }
 
@@ -287,32 +302,15 @@ RINGLET_KERNEL Fixed<T>* sums_of(const GridData<T>& g, std::int64_t node) {
   return reinterpret_cast<Fixed<T>*>(g.node + node * kNodeValues);
 }
 
-template <class T>
-RINGLET_KERNEL void add_sample(const SampleWeights<T>& w, const Octet<T>& value, Fixed<T>* sums) {
-  RINGLET_UNROLL
-  for (int k = 0; k < 3; ++k) {
-    const Octet<T> plane = w.z[k] * value;
-    RINGLET_UNROLL
-    for (int j = 0; j < 3; ++j) {
-      const Octet<T> row = w.y[j] * plane;
-      Fixed<T>* to = sums + w.node(j, k) * kNodeValues;
-      RINGLET_UNROLL
-      for (int i = 0; i < 3; ++i, to += kNodeValues)
-        (Octet<Fixed<T>>::load(to) + nearest(row * w.x[i])).store(to);
-    }
-  }
-}
-
 // The sums of one occupied tile's samples, added to its nodes and those about it. Tiles that are added at the
 // same time must not be neighbours.
 template <class T>
 RINGLET_FUNCTION void scatter_tile(const GridData<T>& g, std::int32_t occupied) {
   const std::int32_t tile = g.occupied_tile[occupied];
-  std::int32_t corner[3];
-  tile_corner(g, tile, corner);
+  const Octet<std::int32_t> corner = tile_corner(g, tile);
   const Octet<T> scale = Octet<T>::load(g.scale);
-  alignas(64) Fixed<T> sums[kHaloNodes * kNodeValues];
-  for (int n = 0; n < kHaloNodes * kNodeValues; ++n) sums[n] = 0;
+  alignas(64) Fixed<T> blocks[kHaloBlocks];
+  for (int n = 0; n < kHaloBlocks; ++n) blocks[n] = 0;
   std::uint64_t rows = 0;
   for_each_piece_of_tile(g, occupied, [&](const Piece& piece, const Segment<T>& segment) {
     const T* rest = g.rest_density + (piece.rest - piece.first);
@@ -324,12 +322,18 @@ RINGLET_FUNCTION void scatter_tile(const GridData<T>& g, std::int32_t occupied) 
       const Octet<T> moved = Octet<T>(a) * first + Octet<T>(b) * second;
       const Octet<T> value = choose<1 << kDensity | 1 << kTarget>(hair, moved);
       const SampleWeights<T> weights(corner, segment.place(t));
-      add_sample(weights, value * scale, sums), rows |= weights.rows();
+      add_sample(weights, value * scale, blocks), rows |= weights.rows();
     }
   });
-  for_each_halo_node(g, tile, rows, [&](int halo, std::int64_t node) {
-    Fixed<T>* to = sums_of(g, node);
-    (Octet<Fixed<T>>::load(to) + Octet<Fixed<T>>::load(sums + halo * kNodeValues)).store(to);
+  for_each_halo_row(g, tile, rows, [&](int y, int z, const HaloRow& row) {
+    alignas(64) Fixed<T> merged[kHaloEdge * kNodeValues];
+    merge_row<T>(blocks, y, z, merged);
+    RINGLET_UNROLL
+    for (int x = 0; x < kHaloEdge; ++x) {
+      if (row.node[x] < 0) continue;
+      Fixed<T>* to = sums_of(g, row.node[x]);
+      (Octet<Fixed<T>>::load(to) + Octet<Fixed<T>>::load(merged + x * kNodeValues)).store(to);
+    }
   });
 }
 
@@ -355,29 +359,11 @@ RINGLET_FUNCTION void finish_tile(const GridData<T>& g, std::int32_t tile) {
 
 // ---- Back to the strands
 
+// What a piece gives back: the change of velocity of its segment's first particle, then of its second, x, y,
+// z in each half; where positions were corrected their displacement follows.
 template <class T>
-RINGLET_KERNEL Octet<T> read_sample(const SampleWeights<T>& w, const T* values) {
-  Octet<T> read(T(0));
-  RINGLET_UNROLL
-  for (int k = 0; k < 3; ++k) {
-    Octet<T> plane(T(0));
-    RINGLET_UNROLL
-    for (int j = 0; j < 3; ++j) {
-      const T* from = values + w.node(j, k) * kNodeValues;
-      Octet<T> row = w.x[0] * Octet<T>::load(from);
-      row = row + w.x[1] * Octet<T>::load(from + kNodeValues);
-      row = row + w.x[2] * Octet<T>::load(from + 2 * kNodeValues);
-      plane = plane + w.y[j] * row;
-    }
-    read = read + w.z[k] * plane;
-  }
-  return read;
-}
-
-// What a piece gives back to its segment's first particle, then to its second.
-template <class T>
-RINGLET_KERNEL T* given_back_to(const GridData<T>& g, std::int32_t piece) {
-  return g.given_back + static_cast<std::int64_t>(piece) * 2 * kNodeValues;
+RINGLET_KERNEL T* given_back_by(const GridData<T>& g, std::int32_t piece) {
+  return g.given_back + static_cast<std::int64_t>(piece) * (g.moved ? 2 : 1) * 8;
 }
 
 // What a tile's samples read off the nodes, gathered to the ends of their segments: of velocities change +
@@ -386,14 +372,15 @@ RINGLET_KERNEL T* given_back_to(const GridData<T>& g, std::int32_t piece) {
 template <class T>
 RINGLET_FUNCTION void gather_tile(const GridData<T>& g, std::int32_t occupied) {
   const std::int32_t tile = g.occupied_tile[occupied];
-  std::int32_t corner[3];
-  tile_corner(g, tile, corner);
-  alignas(64) T values[kHaloNodes * kNodeValues];
-  for (int n = 0; n < kHaloNodes * kNodeValues; ++n) values[n] = T(0);
+  const Octet<std::int32_t> corner = tile_corner(g, tile);
+  alignas(64) T blocks[kHaloBlocks];
+  for (int n = 0; n < kHaloBlocks; ++n) blocks[n] = T(0);
   for (std::int32_t q = g.tile_piece[occupied]; q < g.tile_piece[occupied + 1]; ++q)
-    prefetch(given_back_to(g, g.tile_pieces[q].number));
-  for_each_halo_node(g, tile, kAllRows, [&](int halo, std::int64_t node) {
-    Octet<T>::load(g.node + node * kNodeValues).store(values + halo * kNodeValues);
+    prefetch(given_back_by(g, g.tile_pieces[q].number));
+  for_each_halo_row(g, tile, kAllRows, [&](int y, int z, const HaloRow& row) {
+    RINGLET_UNROLL
+    for (int x = 0; x < kHaloEdge; ++x)
+      if (row.node[x] >= 0) put_node(x, y, z, g.node + row.node[x] * kNodeValues, blocks);
   });
   for_each_piece_of_tile(g, occupied, [&](const Piece& piece, const Segment<T>& segment) {
     // Of the first particle, then of the second; lanes as the nodes'.
@@ -404,39 +391,41 @@ RINGLET_FUNCTION void gather_tile(const GridData<T>& g, std::int32_t occupied) {
     for (std::int32_t s = piece.first; s < piece.end; ++s) {
       const T t = segment.parameter(s), a = (T(1) - t) * segment.share_a, b = t * segment.share_b;
       const T own = T(1) / (a + b);
-      const Octet<T> read = read_sample(SampleWeights<T>(corner, segment.place(t)), values) -
+      const Octet<T> read = read_sample(SampleWeights<T>(corner, segment.place(t)), blocks) -
                             (Octet<T>(a * own) * speed[0] + Octet<T>(b * own) * speed[1]);
       given[0] = given[0] + Octet<T>(a) * read, given[1] = given[1] + Octet<T>(b) * read;
     }
-    T* to = given_back_to(g, piece.number);
-    given[0].store(to), given[1].store(to + kNodeValues);
+    T* to = given_back_by(g, piece.number);
+    shuffled<3, 5, 7, 7, 11, 13, 15, 15>(given[0], given[1]).store(to);
+    if (g.moved) shuffled<2, 4, 6, 6, 10, 12, 14, 14>(given[0], given[1]).store(to + 8);
   });
 }
 
-// Adds what the pieces were given to one strand's velocities and, where `cell` is above 0, to its positions.
+// Adds what the pieces give back to one strand's velocities and, where they were corrected, to its positions.
 template <class T>
-RINGLET_FUNCTION void give_back(const GridData<T>& g, T cell, int strand) {
+RINGLET_FUNCTION void give_back(const GridData<T>& g, int strand) {
   const int batch = strand / kLanes, lane = strand % kLanes;
   const int first = g.first_particle[strand], count = g.first_particle[strand + 1] - first;
+  const T cell = static_cast<T>(g.step.axes.cell);
   for (int i = g.step.clamped; i < count; ++i) {
-    Octet<T> given(T(0));
-    const auto add = [&](std::int32_t segment, int end) {
-      for (std::int32_t q = g.first_piece[segment]; q < g.first_piece[segment + 1]; ++q)
-        given = given + Octet<T>::load(given_back_to(g, q) + end * kNodeValues);
-    };
-    if (i > 0) add(first + i - 1, 1);
-    if (i + 1 < count) add(first + i, 0);
     const std::int64_t base = (static_cast<std::int64_t>(g.step.batches.row[batch]) + i) * 3 * kLanes + lane;
-    const auto turned = [&](int c, int value) {
-      const double* r = g.step.axes.rotation + 3 * c;
-      return static_cast<T>(r[0]) * given.v[kFaceMass + value] +
-             static_cast<T>(r[1]) * given.v[kFaceMass + 2 + value] +
-             static_cast<T>(r[2]) * given.v[kFaceMass + 4 + value];
+    // `quantity` 0: velocities, 1: positions [cells]
+    const auto add = [&](int quantity, T unit, T* to) {
+      Octet<T> given(T(0));
+      const std::int32_t segment = first + i;
+      for (std::int32_t q = g.first_piece[segment - (i > 0)]; q < g.first_piece[segment]; ++q)
+        given = given + second_half(Octet<T>::load(given_back_by(g, q) + quantity * 8));
+      for (std::int32_t q = g.first_piece[segment]; q < g.first_piece[segment + (i + 1 < count)]; ++q)
+        given = given + Octet<T>::load(given_back_by(g, q) + quantity * 8);
+      for (int c = 0; c < 3; ++c) {
+        const double* r = g.step.axes.rotation + 3 * c;
+        to[base + c * kLanes] +=
+            unit * (static_cast<T>(r[0]) * given.v[0] + static_cast<T>(r[1]) * given.v[1] +
+                    static_cast<T>(r[2]) * given.v[2]);
+      }
     };
-    for (int c = 0; c < 3; ++c) {
-      g.step.state.velocity[base + c * kLanes] += turned(c, 1);
-      if (cell > T(0)) g.step.state.position[base + c * kLanes] += cell * turned(c, 0);
-    }
+    add(0, T(1), g.step.state.velocity);
+    if (g.moved) add(1, cell, g.step.state.position);
   }
 }
 
@@ -445,22 +434,21 @@ RINGLET_FUNCTION void give_back(const GridData<T>& g, T cell, int strand) {
 template <class T>
 RINGLET_FUNCTION void rest_densities(const GridData<T>& g, std::int32_t occupied) {
   const std::int32_t tile = g.occupied_tile[occupied];
-  std::int32_t corner[3];
-  tile_corner(g, tile, corner);
+  const Octet<std::int32_t> corner = tile_corner(g, tile);
   T density[kHaloNodes];
-  for (int n = 0; n < kHaloNodes; ++n) density[n] = T(0);
-  for_each_halo_node(g, tile, kAllRows, [&](int halo, std::int64_t node) {
-    density[halo] = g.node[node * kNodeValues + kDensity];
+  for_each_halo_row(g, tile, kAllRows, [&](int y, int z, const HaloRow& row) {
+    for (int x = 0; x < kHaloEdge; ++x)
+      density[halo_node(x, y, z)] = row.node[x] < 0 ? T(0) : g.node[row.node[x] * kNodeValues + kDensity];
   });
   for_each_piece_of_tile(g, occupied, [&](const Piece& piece, const Segment<T>& segment) {
     for (std::int32_t s = piece.first; s < piece.end; ++s) {
       const SampleWeights<T> w(corner, segment.place(segment.parameter(s)));
+      const auto also = [&](int axis) { return w.high.v[axis] > T(0) ? 1 : 0; };
       T& greatest = g.rest_density[piece.rest - piece.first + s];
-      for (int k = 0; k < 3; ++k)
-        for (int j = 0; j < 3; ++j)
-          for (int i = 0; i < 3; ++i)
-            if (w.x[i].v[kDensity] * w.y[j].v[kDensity] * w.z[k].v[kDensity] > T(0))
-              greatest = max(greatest, density[w.corner + (k * kHaloEdge + j) * kHaloEdge + i]);
+      for (int k = 0; k <= also(2); ++k)
+        for (int j = 0; j <= also(1); ++j)
+          for (int i = 0; i <= also(0); ++i)
+            greatest = max(greatest, density[halo_node(w.node.v[0] + i, w.node.v[1] + j, w.node.v[2] + k)]);
     }
   });
 }

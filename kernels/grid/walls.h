@@ -1,5 +1,5 @@
 // Solid walls in the grid: what share of each face lies outside the solids, and how fast the wall moves there
-// (Batty et al. 2007). Only tiles near a solid have any, and of their faces those of fluid cells are looked
+// (Batty et al. 2007). Only what is near a solid has any, and of its faces those of fluid cells are looked
 // at.
 #pragma once
 #include "kernels/grid/transfer.h"
@@ -22,27 +22,23 @@ RINGLET_FUNCTION Vector3<T> in_solid(const GridAxes& axes, const SolidView& soli
   return rotate_into<T>(solid.rotation, away);
 }
 
-// Whether a tile may have faces that are not wholly open.
+// Whether 2 x 2 x 2 cells may have faces that are not wholly open; `part`: their keys' upper bits.
 template <class T>
-RINGLET_FUNCTION bool near_wall(const GridData<T>& g, std::int32_t tile) {
-  // From the middle of 2 x 2 x 2 cells to the farthest of their faces, and half a cell for what is in part
-  // open.
+RINGLET_FUNCTION bool near_wall(const GridData<T>& g, std::int64_t part) {
+  // From their middle to the farthest of their faces, and half a cell for what is in part open.
   const T reach = static_cast<T>(2.25 * g.step.axes.cell);
-  std::int32_t corner[3];
-  tile_corner(g, tile, corner);
+  const Octet<std::int32_t> corner = tile_corner(g, static_cast<std::int32_t>(part / kTileParts));
+  double middle[3];
+  for (int c = 0; c < 3; ++c) middle[c] = kTileEdge * g.low[c] + corner.v[c] + 1 + 2 * (part >> c & 1);
   for (std::int32_t s = 0; s < g.step.solid_count; ++s) {
     const SolidView& solid = g.step.solids[s];
     const T offset = static_cast<T>(solid.offset);
-    for (int part = 0; part < 8; ++part) {
-      double middle[3];
-      for (int c = 0; c < 3; ++c) middle[c] = kTileEdge * g.low[c] + corner[c] + 1 + 2 * (part >> c & 1);
-      const Vector3<T> p = in_solid<T>(g.step.axes, solid, middle);
-      if (BlendedSample<T>(solid, p).distance - offset < reach) return true;
-      // A band narrower than the reach does not tell.
-      if (static_cast<T>(solid.level_set[0].background) - offset < reach &&
-          distance_to_bounds(solid.level_set[0], p) < reach)
-        return true;
-    }
+    const Vector3<T> p = in_solid<T>(g.step.axes, solid, middle);
+    if (BlendedSample<T>(solid, p).distance - offset < reach) return true;
+    // A band narrower than the reach does not tell.
+    if (static_cast<T>(solid.level_set[0].background) - offset < reach &&
+        distance_to_bounds(solid.level_set[0], p) < reach)
+      return true;
   }
   return false;
 }
@@ -83,10 +79,9 @@ struct Opening {
 };
 template <class T>
 RINGLET_FUNCTION Opening<T> opening_of(const GridData<T>& g, std::int64_t node, int axis) {
-  const std::int32_t wall = g.wall[node >> kTileBits];
+  const std::int64_t wall = g.wall[node / kPartCells];
   if (wall < 0) return {T(1), T(0)};
-  const T* at =
-      g.opening + (static_cast<std::int64_t>(wall) * kTileCells + (node & (kTileCells - 1))) * kWallValues;
+  const T* at = g.opening + (wall * kPartCells + node % kPartCells) * kWallValues;
   return {at[axis], at[3 + axis]};
 }
 

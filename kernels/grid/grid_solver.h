@@ -97,7 +97,7 @@ class GridSolver final : public HairGrid<T> {
            given_back_.bytes() + tile_key_.bytes() + near_.bytes() + occupied_key_.bytes() +
            occupied_tile_.bytes() + tile_piece_.bytes() + flag_.bytes() + around_key_.bytes() +
            around_.bytes() + node_.bytes() + lightness_.bytes() + wall_.bytes() + opening_.bytes() +
-           wall_part_.bytes() + fluid_.bytes() + first_cell_.bytes() + tile_density_.bytes() +
+           wall_part_.bytes() + fluid_.bytes() + rows_.bytes() + first_cell_.bytes() + tile_density_.bytes() +
            tile_depth_.bytes();
   }
 
@@ -297,7 +297,8 @@ class GridSolver final : public HairGrid<T> {
   void scatter() {
     const std::size_t nodes = static_cast<std::size_t>(data_.tiles) * kTileCells;
     node_.resize(nodes * kNodeValues), lightness_.resize(nodes * 3);
-    data_.node = node_.data(), data_.lightness = lightness_.data();
+    rows_.resize(data_.occupied);
+    data_.node = node_.data(), data_.lightness = lightness_.data(), data_.rows = rows_.data();
     choose_scale();
     backend_.parallel_for(
         "grid: clear", data_.tiles,
@@ -506,7 +507,7 @@ class GridSolver final : public HairGrid<T> {
   Buffer<T> tile_density_, tile_depth_;
   Buffer<T> rest_density_, particle_, given_back_, node_, lightness_, opening_;
   Buffer<Piece> piece_, tile_pieces_;
-  Buffer<std::uint64_t> piece_key_, tile_key_, occupied_key_, around_key_, fluid_;
+  Buffer<std::uint64_t> piece_key_, tile_key_, occupied_key_, around_key_, fluid_, rows_;
   Buffer<std::uint32_t> piece_of_, around_;
 };
 

@@ -141,6 +141,7 @@ struct GridData {
   std::int32_t occupied;              // tiles with pieces
   const std::int32_t* occupied_tile;  // [occupied] which of the tiles
   const std::int32_t* tile_piece;     // [occupied + 1] first of its pieces
+  std::uint64_t* rows;                // [occupied] of the halo along x that samples reach, a bit for each
   T* node;                            // [tiles][kTileCells][kNodeValues]; the sums first, as Fixed<T>
   T* lightness;                       // [tiles][kTileCells][3] 1 / mass of the faces, 0: none to move
   alignas(64) T scale[kNodeValues];   // of the sums

@@ -325,6 +325,7 @@ RINGLET_FUNCTION void scatter_tile(const GridData<T>& g, std::int32_t occupied) 
       add_sample(weights, value * scale, blocks), rows |= weights.rows();
     }
   });
+  g.rows[occupied] = rows;
   for_each_halo_row(g, tile, rows, [&](int y, int z, const HaloRow& row) {
     alignas(64) Fixed<T> merged[kHaloEdge * kNodeValues];
     merge_row<T>(blocks, y, z, merged);
@@ -377,7 +378,7 @@ RINGLET_FUNCTION void gather_tile(const GridData<T>& g, std::int32_t occupied) {
   for (int n = 0; n < kHaloBlocks; ++n) blocks[n] = T(0);
   for (std::int32_t q = g.tile_piece[occupied]; q < g.tile_piece[occupied + 1]; ++q)
     prefetch(given_back_by(g, g.tile_pieces[q].number));
-  for_each_halo_row(g, tile, kAllRows, [&](int y, int z, const HaloRow& row) {
+  for_each_halo_row(g, tile, g.rows[occupied], [&](int y, int z, const HaloRow& row) {
     RINGLET_UNROLL
     for (int x = 0; x < kHaloEdge; ++x)
       if (row.node[x] >= 0) put_node(x, y, z, g.node + row.node[x] * kNodeValues, blocks);

@@ -61,15 +61,27 @@ RINGLET_FUNCTION LevelSetSample<T> sample_level_set(const LevelSetView& set, Vec
 
   const int x = floor_to_int(q.x), y = floor_to_int(q.y), z = floor_to_int(q.z);
   const T f[3] = {q.x - static_cast<T>(x), q.y - static_cast<T>(y), q.z - static_cast<T>(z)};
-  const auto at = [&](int corner) {
-    const std::int64_t voxel = voxel_at(set, x + (corner >> 2), y + (corner >> 1 & 1), z + (corner & 1));
-    if (voxel < 0) return voxel == kTileOutside ? background : T(0) - background;
-    return static_cast<T>(set.distance[voxel]);
-  };
   const auto mix = [](T t, T a, T b) { return fma(t, b - a, a); };
-  const T low = mix(f[1], mix(f[2], at(0), at(1)), mix(f[2], at(2), at(3)));
-  const T high = mix(f[1], mix(f[2], at(4), at(5)), mix(f[2], at(6), at(7)));
-  return {mix(f[0], low, high), triangle};
+  const auto interpolated = [&](const auto& at) {
+    const T low = mix(f[1], mix(f[2], at(0), at(1)), mix(f[2], at(2), at(3)));
+    const T high = mix(f[1], mix(f[2], at(4), at(5)), mix(f[2], at(6), at(7)));
+    return mix(f[0], low, high);
+  };
+  const std::int64_t lowest = voxel_at(set, x, y, z);
+  if (lowest >= 0 && (x & 7) < 7 && (y & 7) < 7 && (z & 7) < 7) {  // all eight in one tile
+    const float* from = set.distance + lowest;
+    return {interpolated([&](int corner) {
+              return static_cast<T>(from[(corner >> 2) << 6 | (corner >> 1 & 1) << 3 | (corner & 1)]);
+            }),
+            triangle};
+  }
+  return {interpolated([&](int corner) {
+            const std::int64_t voxel =
+                voxel_at(set, x + (corner >> 2), y + (corner >> 1 & 1), z + (corner & 1));
+            if (voxel < 0) return voxel == kTileOutside ? background : T(0) - background;
+            return static_cast<T>(set.distance[voxel]);
+          }),
+          triangle};
 }
 
 // To the box of all tiles [m]; 0 within. Nothing outside it is near the surface.

@@ -38,21 +38,19 @@ struct Octet {
   // `p` aligned to eight values
   RINGLET_KERNEL static Octet load(const T* p) { return *reinterpret_cast<const Octet*>(p); }
   RINGLET_KERNEL void store(T* p) const { *reinterpret_cast<Octet*>(p) = *this; }
-  // `p` wherever it is
-  static RINGLET_KERNEL Octet load_unaligned(const T* p) {
-    Octet a;
+  // `p` aligned to four values
+  static RINGLET_KERNEL Octet load_by_halves(const T* p) {
 #if defined(__CUDACC__)
-    RINGLET_UNROLL
-    for (int k = 0; k < 8; ++k) a.v[k] = p[k];
+    return load(p);
 #else
+    Octet a;
     a.v = *reinterpret_cast<const Unaligned*>(p);
-#endif
     return a;
+#endif
   }
-  RINGLET_KERNEL void store_unaligned(T* p) const {
+  RINGLET_KERNEL void store_by_halves(T* p) const {
 #if defined(__CUDACC__)
-    RINGLET_UNROLL
-    for (int k = 0; k < 8; ++k) p[k] = v[k];
+    store(p);
 #else
     *reinterpret_cast<Unaligned*>(p) = v;
 #endif

@@ -93,7 +93,7 @@ class GridSolver final : public HairGrid<T> {
   std::size_t bytes() const override {
     return backend_.bytes() + pressure_.bytes() + first_particle_.bytes() + ends_.bytes() +
            first_sample_.bytes() + rest_density_.bytes() + particle_.bytes() + first_piece_.bytes() +
-           tile_pieces_.bytes() + piece_.bytes() + piece_key_.bytes() + piece_of_.bytes() +
+           reach_.bytes() + tile_pieces_.bytes() + piece_.bytes() + piece_key_.bytes() + piece_of_.bytes() +
            given_back_.bytes() + tile_key_.bytes() + near_.bytes() + occupied_key_.bytes() +
            occupied_tile_.bytes() + tile_piece_.bytes() + flag_.bytes() + around_key_.bytes() +
            around_.bytes() + node_.bytes() + lightness_.bytes() + wall_.bytes() + opening_.bytes() +
@@ -138,7 +138,8 @@ class GridSolver final : public HairGrid<T> {
       first[strand] = count > 1 ? count : 0;
     });
     data_.particles = backend_.scan("grid: strands", first_particle_, lanes + 1);
-    data_.first_particle = first;
+    reach_.resize(data_.lanes);
+    data_.first_particle = first, data_.reach = reach_.data();
     ends_.resize(data_.particles + 1), first_sample_.resize(data_.particles + 1);
     particle_.resize(std::size_t{8} * (data_.particles + 1)), first_piece_.resize(data_.particles + 1);
     number_samples(step);
@@ -196,10 +197,10 @@ class GridSolver final : public HairGrid<T> {
   }
   // The last tile with a particle along an axis, or against it (`sign` -1).
   std::int32_t furthest(int axis, int sign) {
-    const T* along = data_.particle + axis;
-    return static_cast<std::int32_t>(
-        backend_.largest("grid: bounds", data_.particles, -kFarCells, [=] RINGLET_LAMBDA(int i) {
-          return static_cast<double>(sign) * (floor_to_int(along[static_cast<std::int64_t>(i) * 8]) >> 2);
+    return static_cast<std::int32_t>(backend_.largest(
+        "grid: bounds", data_.lanes, -kFarCells, [reach = data_.reach, axis, sign] RINGLET_LAMBDA(int s) {
+          const T end = sign > 0 ? reach[s].high[axis] : reach[s].low[axis];
+          return static_cast<double>(sign) * (floor_to_int(end) >> 2);
         }));
   }
 
@@ -222,10 +223,6 @@ class GridSolver final : public HairGrid<T> {
     });
     backend_.sort("grid: sort pieces", piece_key_, piece_of_, data_.pieces, bits);
     data_.piece_key = piece_key_.data(), data_.piece_of = piece_of_.data();
-    tile_pieces_.resize(data_.pieces);
-    data_.tile_pieces = tile_pieces_.data();
-    backend_.parallel_for("grid: sort pieces", data_.pieces,
-                          [g = data_] RINGLET_LAMBDA(int q) { g.tile_pieces[q] = g.piece[g.piece_of[q]]; });
   }
 
   // The tiles that pieces lie in, those about them, and where each tile's neighbours are.
@@ -233,7 +230,8 @@ class GridSolver final : public HairGrid<T> {
     occupied_key_.resize(data_.pieces);
     tile_piece_.resize(data_.pieces + 1);
     data_.occupied = unique(piece_key_.data(), data_.pieces, occupied_key_, &tile_piece_);
-    data_.tile_piece = tile_piece_.data();
+    tile_pieces_.resize(data_.pieces);
+    data_.tile_piece = tile_piece_.data(), data_.tile_pieces = tile_pieces_.data();
     const std::int32_t candidates = data_.occupied * kAround;
     around_key_.resize(candidates), around_.resize(candidates);
     std::uint64_t* around = around_key_.data();
@@ -242,7 +240,7 @@ class GridSolver final : public HairGrid<T> {
     backend_.parallel_for(
         "grid: dilate", data_.occupied,
         [g = data_, around, occupied] RINGLET_LAMBDA(int t) {
-          const std::uint32_t reached = tiles_reached(g, t);
+          const std::uint32_t reached = collect_pieces(g, t);
           for (int n = 0; n < kAround; ++n)
             around[t * kAround + n] = reached >> n & 1 ? key_around(occupied[t], n) : occupied[t];
         },
@@ -332,11 +330,9 @@ class GridSolver final : public HairGrid<T> {
             count += g.tile_pieces[q].end - g.tile_pieces[q].first;
           return count;
         });
-    const T* particle = data_.particle;
-    const double speed = backend_.largest("grid: speed", data_.particles, 1e-30, [=] RINGLET_LAMBDA(int i) {
-      const T* u = particle + static_cast<std::int64_t>(i) * 8 + 3;
-      return static_cast<double>(max(abs(u[0]), max(abs(u[2]), abs(u[4]))));
-    });
+    const double speed = backend_.largest(
+        "grid: speed", data_.lanes, 1e-30,
+        [reach = data_.reach] RINGLET_LAMBDA(int s) { return static_cast<double>(reach[s].speed); });
     constexpr int kMostWeight = kMostSampleLength > kMostSampleMass ? kMostSampleLength : kMostSampleMass;
     const double unit = 0.9 * FixedPoint<T>::kRange / (8.0 * kMostWeight * samples);
     for (int v = 0; v < kNodeValues; ++v) data_.scale[v] = static_cast<T>(unit);
@@ -506,6 +502,7 @@ class GridSolver final : public HairGrid<T> {
   Buffer<unsigned char> ends_;
   Buffer<T> tile_density_, tile_depth_;
   Buffer<T> rest_density_, particle_, given_back_, node_, lightness_, opening_;
+  Buffer<StrandReach<T>> reach_;
   Buffer<Piece> piece_, tile_pieces_;
   Buffer<std::uint64_t> piece_key_, tile_key_, occupied_key_, around_key_, fluid_, rows_;
   Buffer<std::uint32_t> piece_of_, around_;

@@ -109,6 +109,13 @@ struct Piece {
   std::uint32_t reached;  // which of the tiles about the tile its samples lie nearest to, a bit for each
 };
 
+// Of a strand's particles in the grid's axes, from their origin: the lowest and highest coordinates [cells],
+// and the largest component of their velocities [m/s].
+template <class T>
+struct StrandReach {
+  T low[3], high[3], speed;
+};
+
 inline constexpr unsigned char kFirstOfStrand = 1, kLastOfStrand = 2;
 
 // The grid's memory. Particles are numbered strand after strand, in the batches' order.
@@ -123,6 +130,7 @@ struct GridData {
   const std::int32_t* first_sample;  // [particles + 1] of the segment that begins there
   T* rest_density;                   // [samples] lambda_0
   T* particle;  // [particles][8] place [cells], then velocity relative to the axes [m/s] in 3, 5 and 7
+  StrandReach<T>* reach;  // [lanes]
   // Pieces, in the order of segments, and by tile
   const std::int32_t* first_piece;  // [particles + 1]
   Piece* piece;                     // [pieces]

@@ -14,10 +14,10 @@ namespace ringlet::kernels {
 enum Direction { kLowX, kHighX, kLowY, kHighY, kLowZ, kHighZ, kDirections };
 
 inline constexpr int kTileEdge = 4, kTileBits = 6, kTileCells = 1 << kTileBits;
-inline constexpr int kTileParts = 8,
-                     kPartCells = kTileCells / kTileParts;  // 2 x 2 x 2 cells, one after the other
-inline constexpr int kAround = 27;                          // tiles round a tile, itself among them
-inline constexpr int kTileAxisBits = 18;                    // of a tile's coordinate
+inline constexpr int kTileParts = 8;  // of 2 x 2 x 2 cells, one after the other
+inline constexpr int kPartCells = kTileCells / kTileParts;
+inline constexpr int kAround = 27;        // tiles round a tile, itself among them
+inline constexpr int kTileAxisBits = 18;  // of a tile's coordinate
 
 inline namespace RINGLET_ISA {
 

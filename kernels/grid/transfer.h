@@ -22,8 +22,8 @@ RINGLET_FUNCTION Vector3<T> rotate_into(const double* rotation, const double* a)
   return {along(0), along(1), along(2)};
 }
 
-// Places and velocities of one lane's particles in the grid's axes, from their origin; `shift_particle` makes
-// it the lowest tile's corner.
+// Places and velocities of one lane's particles in the grid's axes, and what they reach, from the axes'
+// origin; `shift_particle` takes the places from the lowest tile's corner.
 template <class T>
 RINGLET_FUNCTION void place_strand(const GridData<T>& g, int strand) {
   const StrandBatches<T>& batches = g.step.batches;
@@ -36,7 +36,8 @@ RINGLET_FUNCTION void place_strand(const GridData<T>& g, int strand) {
     carried[c] = axes.velocity[c] + axes.slope[3 * c] * root[0] + axes.slope[3 * c + 1] * root[1] +
                  axes.slope[3 * c + 2] * root[2];
   const Vector3<T> at_root = rotate_into<T>(axes.rotation, root);
-  const T per_cell = static_cast<T>(1 / axes.cell);
+  const T per_cell = static_cast<T>(1 / axes.cell), far = static_cast<T>(kFarCells);
+  StrandReach<T> reach{{far, far, far}, {-far, -far, -far}, T(0)};
   for (int i = 0; i < count; ++i) {
     const std::int64_t base = (static_cast<std::int64_t>(batches.row[batch]) + i) * 3 * kLanes + lane;
     double x[3], u[3];
@@ -45,14 +46,18 @@ RINGLET_FUNCTION void place_strand(const GridData<T>& g, int strand) {
       u[c] = static_cast<double>(g.step.state.velocity[base + c * kLanes]) - carried[c] -
              (axes.slope[3 * c] * x[0] + axes.slope[3 * c + 1] * x[1] + axes.slope[3 * c + 2] * x[2]);
     const Vector3<T> place = per_cell * (at_root + rotate_into<T>(axes.rotation, x));
-    const T far = static_cast<T>(kFarCells);
     // What is not a number lies at the far end too, and keeps conversions defined.
     const auto bounded = [&](T a) { return min(max(-far, a), far); };
     const Vector3<T> velocity = rotate_into<T>(axes.rotation, u);
     T* to = g.particle + static_cast<std::int64_t>(first + i) * 8;
     to[0] = bounded(place.x), to[1] = bounded(place.y), to[2] = bounded(place.z);
     to[3] = velocity.x, to[4] = T(0), to[5] = velocity.y, to[6] = T(0), to[7] = velocity.z;
+    for (int c = 0; c < 3; ++c)
+      reach.low[c] = min(reach.low[c], to[c]), reach.high[c] = max(reach.high[c], to[c]);
+    const T speed = max(abs(velocity.x), max(abs(velocity.y), abs(velocity.z)));
+    reach.speed = speed > reach.speed ? speed : reach.speed;  // no number does not count
   }
+  g.reach[strand] = reach;
 }
 
 template <class T>
@@ -251,13 +256,17 @@ RINGLET_FUNCTION std::uint64_t key_around(std::uint64_t key, int n) {
   return key;
 }
 
-// Which of the tiles about an occupied tile its samples reach, a bit for each: those beside the cells they
-// lie in.
+// Lays the pieces of an occupied tile one after the other. Returns which of the tiles about it their samples
+// reach, a bit for each: those beside the cells that they lie in.
 template <class T>
-RINGLET_FUNCTION std::uint32_t tiles_reached(const GridData<T>& g, std::int32_t occupied) {
+RINGLET_FUNCTION std::uint32_t collect_pieces(const GridData<T>& g, std::int32_t occupied) {
   std::uint32_t reached = 0;
-  for (std::int32_t q = g.tile_piece[occupied]; q < g.tile_piece[occupied + 1]; ++q)
+  for (std::int32_t q = g.tile_piece[occupied]; q < g.tile_piece[occupied + 1]; ++q) {
+    constexpr int kAhead = 16;
+    if (q + kAhead < g.pieces) prefetch(g.piece + g.piece_of[q + kAhead]);
+    g.tile_pieces[q] = g.piece[g.piece_of[q]];
     reached |= g.tile_pieces[q].reached;
+  }
   // What reaches a corner reaches its edges and faces.
   for (int axis = 0, stride = 1; axis < 3; ++axis, stride *= 3)
     for (int n = 0; n < kAround; ++n)
@@ -309,8 +318,8 @@ RINGLET_FUNCTION void scatter_tile(const GridData<T>& g, std::int32_t occupied) 
   const std::int32_t tile = g.occupied_tile[occupied];
   const Octet<std::int32_t> corner = tile_corner(g, tile);
   const Octet<T> scale = Octet<T>::load(g.scale);
-  alignas(64) Fixed<T> blocks[kHaloBlocks];
-  for (int n = 0; n < kHaloBlocks; ++n) blocks[n] = 0;
+  alignas(64) Fixed<T> blocks[kSumBlocks];
+  for (int n = 0; n < kSumBlocks; ++n) blocks[n] = 0;
   std::uint64_t rows = 0;
   for_each_piece_of_tile(g, occupied, [&](const Piece& piece, const Segment<T>& segment) {
     const T* rest = g.rest_density + (piece.rest - piece.first);
@@ -374,14 +383,13 @@ template <class T>
 RINGLET_FUNCTION void gather_tile(const GridData<T>& g, std::int32_t occupied) {
   const std::int32_t tile = g.occupied_tile[occupied];
   const Octet<std::int32_t> corner = tile_corner(g, tile);
-  alignas(64) T blocks[kHaloBlocks];
-  for (int n = 0; n < kHaloBlocks; ++n) blocks[n] = T(0);
+  alignas(64) T blocks[kValueBlocks];  // of the rows that samples reach: no others are read
   for (std::int32_t q = g.tile_piece[occupied]; q < g.tile_piece[occupied + 1]; ++q)
     prefetch(given_back_by(g, g.tile_pieces[q].number));
   for_each_halo_row(g, tile, g.rows[occupied], [&](int y, int z, const HaloRow& row) {
     RINGLET_UNROLL
     for (int x = 0; x < kHaloEdge; ++x)
-      if (row.node[x] >= 0) put_node(x, y, z, g.node + row.node[x] * kNodeValues, blocks);
+      put_node(x, y, z, row.node[x] < 0 ? nullptr : g.node + row.node[x] * kNodeValues, blocks);
   });
   for_each_piece_of_tile(g, occupied, [&](const Piece& piece, const Segment<T>& segment) {
     // Of the first particle, then of the second; lanes as the nodes'.

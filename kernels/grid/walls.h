@@ -26,13 +26,15 @@ RINGLET_FUNCTION Vector3<T> in_solid(const GridAxes& axes, const SolidView& soli
 template <class T>
 RINGLET_FUNCTION bool near_wall(const GridData<T>& g, std::int64_t part) {
   // From their middle to the farthest of their faces, and half a cell for what is in part open.
-  const T reach = static_cast<T>(2.25 * g.step.axes.cell);
+  const T cells = static_cast<T>(2.25 * g.step.axes.cell);
   const Octet<std::int32_t> corner = tile_corner(g, static_cast<std::int32_t>(part / kTileParts));
   double middle[3];
   for (int c = 0; c < 3; ++c) middle[c] = kTileEdge * g.low[c] + corner.v[c] + 1 + 2 * (part >> c & 1);
   for (std::int32_t s = 0; s < g.step.solid_count; ++s) {
     const SolidView& solid = g.step.solids[s];
     const T offset = static_cast<T>(solid.offset);
+    // Far from its surface a level set tells the value of the voxel nearest, by half a diagonal at most.
+    const T reach = cells + static_cast<T>(0.87f * solid.level_set[0].voxel_size);
     const Vector3<T> p = in_solid<T>(g.step.axes, solid, middle);
     if (BlendedSample<T>(solid, p).distance - offset < reach) return true;
     // A band narrower than the reach does not tell.

@@ -39,7 +39,7 @@ struct Octet {
   RINGLET_KERNEL static Octet load(const T* p) { return *reinterpret_cast<const Octet*>(p); }
   RINGLET_KERNEL void store(T* p) const { *reinterpret_cast<Octet*>(p) = *this; }
   // `p` aligned to four values
-  static RINGLET_KERNEL Octet load_by_halves(const T* p) {
+  RINGLET_KERNEL static Octet load_by_halves(const T* p) {
 #if defined(__CUDACC__)
     return load(p);
 #else
@@ -117,6 +117,16 @@ RINGLET_KERNEL Octet<T> choose(const Octet<T>& a, const Octet<T>& b) {
 template <int k, class T>
 RINGLET_KERNEL Octet<T> spread(const Octet<T>& a) {
   return shuffled<k, k, k, k, k, k, k, k>(a, a);
+}
+
+// Half of the lanes, in both halves.
+template <class T>
+RINGLET_KERNEL Octet<T> first_half(const Octet<T>& a) {
+  return shuffled<0, 1, 2, 3, 0, 1, 2, 3>(a, a);
+}
+template <class T>
+RINGLET_KERNEL Octet<T> second_half(const Octet<T>& a) {
+  return shuffled<4, 5, 6, 7, 4, 5, 6, 7>(a, a);
 }
 
 // The lanes that are not 0, a bit for each.

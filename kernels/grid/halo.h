@@ -56,15 +56,6 @@ struct SampleWeights {
   RINGLET_KERNEL Octet<T> both_y() const { return shuffled<1, 1, 9, 9, 5, 5, 13, 13>(low, high); }
 };
 
-template <class T>
-RINGLET_KERNEL Octet<T> first_half(const Octet<T>& a) {
-  return shuffled<0, 1, 2, 3, 0, 1, 2, 3>(a, a);
-}
-template <class T>
-RINGLET_KERNEL Octet<T> second_half(const Octet<T>& a) {
-  return shuffled<4, 5, 6, 7, 4, 5, 6, 7>(a, a);
-}
-
 // ---- Sums
 
 template <class T>

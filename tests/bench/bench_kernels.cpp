@@ -186,7 +186,8 @@ void contact_step(benchmark::State& run, InstructionSet set, bool near) {
                                figures.data(),
                                T(10),
                                T(1000),
-                               0};
+                               0,
+                               nullptr};
   for (auto _ : run)
     kernels::cpu_kernels<T>(set).contact_step(step, 0, bench.model.layout.batches(), bench.scratch.data());
   report(run);
